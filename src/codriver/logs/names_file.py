@@ -1,0 +1,124 @@
+"""Names files: TOML that maps a source's channels to standard names.
+
+    [longitudinal_speed]
+    source = "Wheels.FrontLeft"       # or a list, whose mean is taken: ["Wheels.RearLeft", "Wheels.RearRight"]
+    unit = "km/h"                     # overrides what the source says; needed where it says nothing
+    scale = 1.01                      # optional: value * scale + offset, in the source's unit, before the unit is converted
+    offset = 0.0
+    sign = -1                         # optional: -1 turns the direction
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from codriver.errors import NamesError, UnitError
+from codriver.names import VOCABULARY, nearest
+from codriver.units import to_si
+
+_FIELDS = ("source", "unit", "scale", "offset", "sign")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """How one standard signal is made from a source's channels.
+
+    Attributes:
+        name: standard name.
+        source: the source's own names; the mean is taken of several.
+        unit: overrides the source's unit; None keeps it.
+        scale, offset: applied in the source's unit, before conversion.
+        sign: 1 or -1.
+    """
+
+    name: str
+    source: tuple[str, ...]
+    unit: str | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+    sign: int = 1
+
+
+@dataclass(frozen=True)
+class NamesFile:
+    """A mapping from a source's channels to standard names, by standard name."""
+
+    entries: Mapping[str, Entry]
+    where: str = ""
+
+    @classmethod
+    def of(cls, *entries: Entry, where: str = "") -> NamesFile:
+        """A mapping of the entries given."""
+        return cls({entry.name: entry for entry in entries}, where)
+
+
+def load_names(path: str | Path) -> NamesFile:
+    """Read a names file.
+
+    Raises:
+        NamesError: it cannot be read, or is wrong; the message lists every fault at once.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise NamesError(f"cannot read {path}: {error}", "a TOML file", "check the path") from None
+    return parse_names(text, str(path))
+
+
+def parse_names(text: str, where: str) -> NamesFile:
+    """A mapping from the text of a names file.
+
+    Raises:
+        NamesError: listing every fault of the file.
+    """
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise NamesError(f"{where} is not TOML: {error}", "a TOML file", "mend the line named") from None
+    faults: list[str] = []
+    entries = [entry for name, table in tables.items() if (entry := _entry(name, table, faults)) is not None]
+    if not entries and not faults:
+        faults.append("no signal is mapped")
+    if faults:
+        raise NamesError(
+            f"{where}: " + "; ".join(faults),
+            "tables named by standard signal names, each with source, and unit, scale, offset, sign where needed",
+            "mend the file; docs/names.md lists the names, `codriver info LOG` the channels of a log",
+        )
+    return NamesFile.of(*entries, where=where)
+
+
+def _entry(name: str, table: Any, faults: list[str]) -> Entry | None:
+    """One table of the file; what is wrong with it is added to `faults`."""
+    if name not in VOCABULARY or not isinstance(table, dict):
+        near = nearest(name, VOCABULARY)
+        faults.append(f"[{name}] is not a standard signal name" + (f" (did you mean {near}?)" if near else ""))
+        return None
+    before = len(faults)
+    faults.extend(f"[{name}] has an unknown key '{key}'" for key in table if key not in _FIELDS)
+    source = table.get("source")
+    sources = (source,) if isinstance(source, str) else tuple(source) if isinstance(source, list) else ()
+    if not sources or not all(isinstance(s, str) and s for s in sources):
+        faults.append(f"[{name}] source must be the name of a channel, or a list of them")
+    for key in ("scale", "offset"):
+        number = table.get(key, 1.0)
+        if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
+            faults.append(f"[{name}] {key} must be a number")
+    if table.get("scale", 1.0) == 0:
+        faults.append(f"[{name}] scale must not be 0")
+    if table.get("sign", 1) not in (1, -1):
+        faults.append(f"[{name}] sign must be 1 or -1")
+    unit = table.get("unit")
+    if unit is not None:
+        try:
+            to_si(str(unit), VOCABULARY[name].unit)
+        except UnitError as error:
+            faults.append(f"[{name}] {error.found} (expected {error.expected})")
+    if len(faults) > before:
+        return None
+    return Entry(name, sources, unit, float(table.get("scale", 1.0)), float(table.get("offset", 0.0)), int(table.get("sign", 1)))

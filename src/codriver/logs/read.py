@@ -1,0 +1,135 @@
+"""From a recording to a Log: channels by standard name, in SI units, on clocks that run forward."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from codriver.errors import LogError, NamesError, UnitError
+from codriver.logs.mend import find_faults, mend_clock
+from codriver.logs.names_file import Entry, NamesFile, load_names
+from codriver.logs.recording import RawSignal, Recording
+from codriver.logs.registry import ReadOptions, find_reader
+from codriver.names import VOCABULARY, nearest
+from codriver.signals import Log, Signal
+from codriver.units import to_si
+
+
+def open_recording(path: str | Path, *, dbc: str | Path | None = None, bus: int | None = None) -> Recording:
+    """Open a recording without loading its samples.
+
+    Args:
+        path: a file or a folder of a known layout.
+        dbc: CAN database, for raw CAN traces.
+        bus: CAN channel to keep; None keeps all.
+
+    Raises:
+        LogError: it does not exist, or cannot be read.
+        FormatError: no reader knows it, or it is not what its name promises.
+    """
+    path = Path(path)
+    return find_reader(path).function(path, ReadOptions(Path(dbc) if dbc is not None else None, bus))
+
+
+def read(
+    path: str | Path,
+    *,
+    dbc: str | Path | None = None,
+    names: str | Path | NamesFile | None = None,
+    bus: int | None = None,
+) -> Log:
+    """Read a recording as a Log of standard signals in SI units.
+
+    Without a names file, the mapping of a known layout is used; for others, channels whose own name is a standard name.
+    What is wrong with the recording and can be got round (time running backwards, duplicate stamps, NaN, a stuck signal)
+    is told in `Log.faults`.
+
+    Args:
+        path: a file or a folder of a known layout.
+        dbc: CAN database, for raw CAN traces.
+        names: names file (a path, or loaded already).
+        bus: CAN channel to keep; None keeps all.
+
+    Raises:
+        LogError: the recording cannot be read, or holds none of the signals.
+        NamesError: the names file is wrong, or names channels that the recording lacks altogether.
+        UnitError: a unit is unknown or of another kind.
+    """
+    return read_recording(open_recording(path, dbc=dbc, bus=bus), names)
+
+
+def read_recording(recording: Recording, names: str | Path | NamesFile | None = None) -> Log:
+    """The Log of an opened recording; see `read`."""
+    mapping = names if isinstance(names, NamesFile) else load_names(names) if names is not None else recording.default_names
+    channels = recording.channels()
+    if mapping is None:
+        mapping = own_names(recording)
+    if not mapping.entries:
+        listed = ", ".join(sorted(channels)[:12]) + (", ..." if len(channels) > 12 else "")
+        raise LogError(
+            f"{recording.path} ({recording.format}) has {len(channels)} channels, none with a standard name: {listed or '(none)'}",
+            "channels named by the standard names, or a names file that maps them",
+            "write a names file (docs/names.md shows how) and give it with --names",
+        )
+    faults: list[str] = []
+    wanted = {source for entry in mapping.entries.values() for source in entry.source}
+    raw = recording.load(wanted)
+    signals = []
+    for entry in mapping.entries.values():
+        absent = [source for source in entry.source if source not in raw]
+        if absent:
+            near = nearest(absent[0], channels)
+            faults.append(
+                f"{entry.name}: the recording has no channel '{absent[0]}'" + (f"; did the names file mean {near}?" if near else "")
+            )
+            continue
+        signals.append(_standard(entry, [raw[source] for source in entry.source], faults))
+    signals = [signal for signal in signals if len(signal)]
+    if not signals:
+        raise (LogError if names is None else NamesError)(
+            f"{recording.path}: none of the {len(mapping.entries)} mapped signals has samples. " + " ".join(faults[:4]),
+            "at least one channel that the recording holds",
+            "`codriver info LOG` lists the channels; check the names file, the DBC and the bus",
+        )
+    used = {source for entry in mapping.entries.values() for source in entry.source}
+    log = Log.of(signals, recording.path)
+    all_faults = (*recording.faults, *faults, *log.implausible())
+    return Log(log.signals, recording.path, all_faults, tuple(sorted(set(channels) - used)))
+
+
+def own_names(recording: Recording) -> NamesFile:
+    """The mapping of channels that bear standard names themselves: "time,longitudinal_speed,..." or "Message.gear"."""
+    entries: dict[str, Entry] = {}
+    for name in recording.channels():
+        short = name.rsplit(".", 1)[-1].split("[")[0].strip()
+        if short in VOCABULARY and short not in entries:
+            entries[short] = Entry(short, (name,))
+    return NamesFile(entries, "the channels' own names")
+
+
+def _standard(entry: Entry, parts: list[RawSignal], faults: list[str]) -> Signal:
+    """One standard signal from its raw parts."""
+    target = VOCABULARY[entry.name].unit
+    mended = []
+    for source, part in zip(entry.source, parts, strict=True):
+        time, values, notes = mend_clock(np.asarray(part.time, float), np.asarray(part.values, float))
+        faults.extend(f"{entry.name} ({source}): {note}" for note in notes)
+        unit = entry.unit if entry.unit is not None else part.unit or target
+        try:
+            factor, offset = to_si(unit, target)
+        except UnitError as error:
+            raise UnitError(f"{entry.name} ({source}): {error.found}", error.expected, error.do) from None
+        scale = factor * entry.sign
+        same = scale == 1.0 and entry.scale == 1.0 and entry.offset == 0.0 and offset == 0.0
+        mended.append((time, values if same else (values * entry.scale + entry.offset) * scale + offset))
+    time, values = mended[0]
+    for other_time, other in mended[1:]:
+        if other_time.shape == time.shape and np.array_equal(other_time, time):
+            values = values + other
+        else:  # held onto the first part's clock
+            index = np.searchsorted(other_time, time, side="right") - 1
+            values = values + np.where(index >= 0, other[np.maximum(index, 0)], np.nan) if other.size else values + np.nan
+    signal = Signal(entry.name, time, values / len(mended) if len(mended) > 1 else values, target, " + ".join(entry.source))
+    faults.extend(find_faults(signal))
+    return signal

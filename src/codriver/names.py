@@ -1,0 +1,117 @@
+"""The vocabulary: standard signal names, their units, symbols and sign conventions.
+
+A standard name means one quantity, in one unit, with one sign, wherever it appears: in a log, in an observer's inputs, in
+the exported C. Axes are ISO 8855 (x forward, y left, z up). Units inside are SI and radians; `display` is the unit in
+which people of the field read the quantity, and is used by reports alone.
+
+`low`, `high` bound what a road vehicle can plausibly show. They do not clip anything: a log outside them gets a warning
+that its unit or its scale is probably wrong. `hold` is how long, in seconds, the last value of a signal may stand in for a
+missing one before it counts as stale; quantities sent on change only (gear, switches) are held without limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import inf, pi
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One entry of the vocabulary.
+
+    Attributes:
+        name: the standard name.
+        unit: SI unit, as pint writes it; "1" for pure numbers.
+        display: the unit shown to people.
+        symbol: the papers' letter.
+        meaning: what it is, with its sign.
+        low, high: plausible range in `unit`.
+        hold: seconds for which the last value may be held.
+    """
+
+    name: str
+    unit: str
+    display: str
+    symbol: str
+    meaning: str
+    low: float = -inf
+    high: float = inf
+    hold: float = 0.5
+
+
+_ENTRIES = (
+    # what the vehicle does
+    Quantity("longitudinal_speed", "m/s", "km/h", "v", "speed over ground along x; negative in reverse", -20, 110),
+    Quantity("longitudinal_acceleration", "m/s^2", "m/s^2", "y1",
+             "what an accelerometer along x shows: dv/dt + g sin(slope) + bias; positive when speeding up", -20, 20),
+    Quantity("longitudinal_jerk", "m/s^3", "m/s^3", "j", "time derivative of the vehicle's acceleration along x"),
+    Quantity("lateral_velocity", "m/s", "m/s", "vy", "velocity along y, positive to the left", -30, 30),
+    Quantity("lateral_acceleration", "m/s^2", "m/s^2", "ay", "acceleration along y, positive to the left", -30, 30),
+    Quantity("vertical_acceleration", "m/s^2", "m/s^2", "az", "specific force along z, +9.81 at rest", -60, 60),
+    Quantity("sideslip_angle", "rad", "deg", "beta", "atan(vy/vx)", -pi, pi),
+    Quantity("yaw_rate", "rad/s", "deg/s", "r", "rotation about z, positive to the left", -7, 7),
+    Quantity("roll_rate", "rad/s", "deg/s", "p", "rotation about x, positive when the right side goes down", -7, 7),
+    Quantity("pitch_rate", "rad/s", "deg/s", "q", "rotation about y, positive when the nose goes down", -7, 7),
+    Quantity("roll_angle", "rad", "deg", "phi", "positive when leaning to the right", -pi / 2, pi / 2),
+    Quantity("distance", "m", "m", "s", "distance travelled, the papers' curvilinear coordinate", -1e3, 1e7),
+    Quantity("latitude", "deg", "deg", "lat", "north positive", -90, 90),
+    Quantity("longitude", "deg", "deg", "lon", "east positive", -180, 180),
+    Quantity("altitude", "m", "m", "h", "height above sea level", -500, 9000),
+    # what the person does
+    Quantity("accelerator_pedal", "1", "%", "p_r", "accelerator pedal position, 0 released to 1 fully pressed", -0.02, 1.02),
+    Quantity("brake_pressure", "Pa", "bar", "p_b", "brake master-cylinder pressure, gauge", -5e5, 3e7),
+    Quantity("brake_switch", "1", "1", "sigma", "1 while the brake pedal is pressed", 0, 1, inf),
+    Quantity("steering_wheel_angle", "rad", "deg", "delta_s", "positive to the left", -20, 20),
+    Quantity("steering_wheel_rate", "rad/s", "deg/s", "omega_s", "positive to the left", -40, 40),
+    Quantity("steering_wheel_torque", "N*m", "N*m", "T_s", "torque in the steering column, positive to the left", -100, 100),
+    Quantity("steer_angle", "rad", "deg", "delta", "angle of the steered wheel or fork, positive to the left", -pi, pi),
+    Quantity("steer_rate", "rad/s", "deg/s", "omega", "rate of the steered wheel or fork", -40, 40),
+    Quantity("driver_torque", "N*m", "N*m", "T_dr", "torque of the driver's hands on the wheel, positive to the left", -100, 100),
+    Quantity("rider_torque", "N*m", "N*m", "T_r", "torque of the rider's hands on the handlebar", -300, 300),
+    Quantity("alignment_torque", "N*m", "N*m", "T_aln", "torque of the tyres on the steering column", -300, 300),
+    Quantity("front_lateral_force", "N", "N", "Y_f", "lateral force of the front tyres, positive to the left"),
+    Quantity("rear_lateral_force", "N", "N", "Y_r", "lateral force of the rear tyres, positive to the left"),
+    # what the powertrain does
+    Quantity("engine_torque", "N*m", "N*m", "T_e", "torque the engine or motor actually gives", -1500, 3000),
+    Quantity("engine_torque_request", "N*m", "N*m", "T_r", "torque the driver requests by the pedal", -1500, 3000),
+    Quantity("engine_speed", "rad/s", "rpm", "omega_e", "rotation of the engine or motor", -50, 2500),
+    Quantity("gear", "1", "1", "gear", "engaged gear: 1, 2, ...; 0 neutral; -1 reverse", -1, 12, inf),
+    Quantity("clutch", "1", "1", "clutch", "0 closed (torque passes) to 1 open (no torque passes)", 0, 1, inf),
+    # the road
+    Quantity("road_slope", "rad", "%", "alpha", "positive uphill", -0.6, 0.6),
+    Quantity("road_curvature", "1/m", "1/m", "rho", "positive to the left", -1, 1),
+    # what codriver estimates
+    Quantity("intentional_acceleration", "m/s^2", "m/s^2", "a_i", "acceleration the driver asks for"),
+    Quantity("intentional_jerk", "m/s^3", "m/s^3", "j_i", "time derivative of the acceleration the driver asks for"),
+    Quantity("acceleration_offset", "m/s^2", "m/s^2", "o_a", "accelerometer offset: g sin(slope) + bias"),
+    Quantity("known_input", "m/s^2", "m/s^2", "u", "what the powertrain adds to the driver's intention"),
+)
+
+VOCABULARY: dict[str, Quantity] = {entry.name: entry for entry in _ENTRIES}
+
+
+def quantity(name: str) -> Quantity:
+    """The vocabulary's entry for a standard name.
+
+    Raises:
+        UsageError: the name is not in the vocabulary; the message names the nearest ones.
+    """
+    from codriver.errors import UsageError
+
+    try:
+        return VOCABULARY[name]
+    except KeyError:
+        near = nearest(name, VOCABULARY)
+        raise UsageError(
+            f"'{name}' is not a standard signal name",
+            "one of the names in codriver.names.VOCABULARY" + (f", perhaps {near}" if near else ""),
+            "see docs/names.md for the list",
+        ) from None
+
+
+def nearest(name: str, among: Iterable[str]) -> str:
+    """The names most like `name`, as text for an error message; empty if none is alike."""
+    from difflib import get_close_matches
+
+    return " or ".join(f"'{other}'" for other in get_close_matches(name, list(among), n=3, cutoff=0.5))
