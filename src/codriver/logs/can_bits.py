@@ -78,6 +78,14 @@ def extract(payload: Payload, layout: Layout) -> npt.NDArray[np.float64]:
     return top.astype(np.float64)
 
 
+def take(payload: Payload, which: npt.NDArray[Any]) -> Payload:
+    """Some rows of a column of payloads, by number or by flag, as new contiguous rows."""
+    width = payload.shape[1]
+    # A row as one element: numpy gathers elements five times faster than rows of bytes.
+    rows = np.ascontiguousarray(payload).view("u8" if width == 8 else f"V{width}")
+    return rows[:, 0][which].view(np.uint8).reshape(-1, width)
+
+
 def _top(payload: Payload, layout: Layout) -> npt.NDArray[np.uint64]:
     """Words of 64 bits whose top `length` bits are the number, most significant first."""
     span = layout.needs - layout.first_byte

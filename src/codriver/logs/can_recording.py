@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from codriver.errors import LogError
+from codriver.logs.can_bits import take
 from codriver.logs.can_streams import Stream, find_streams, list_streams, name_identifier
 from codriver.logs.dbc import Database, MessageLayout, decode, load_database
 from codriver.logs.frames import Frames
@@ -89,7 +90,7 @@ class CanRecording(Recording):
         """The samples of some signals of one message."""
         stream = self._choose(message)
         rows = stream.rows
-        time, payload, length = self.frames.time[rows], self.frames.data[rows], self.frames.length[rows]
+        time, payload, length = self.frames.time[rows], take(self.frames.data, rows), self.frames.length[rows]
         loaded, short = {}, 0
         for name in dict.fromkeys(signals):
             signal = message.signals[name]
@@ -128,7 +129,7 @@ class CanRecording(Recording):
             unknown = len(self._streams) - len(known)
             self._tell(
                 f"{len(absent)} of the {len(asked)} messages asked for are not in the trace ({', '.join(absent[:4])}), "
-                f"and {unknown} of its {len(self._streams)} identifiers are not in the database; is it that of this bus?"
+                f"and {unknown} of its {len(self._streams)} identifiers are not in the database; is it this bus's?"
             )
 
     def _tell(self, fault: str) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from codriver.errors import LogError
-from codriver.logs.can_bits import Layout, Payload, extract
+from codriver.logs.can_bits import Layout, Payload, extract, take
 from codriver.signals.signal import Array
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def decode(
         carried = selected if carried is None else carried & selected
     if carried is not None and carried.all():
         carried = None
-    values = extract(payload if carried is None else payload[carried], signal.raw)
+    values = extract(payload if carried is None else take(payload, carried), signal.raw)
     if signal.scale != 1.0:
         values *= signal.scale
     if signal.offset != 0.0:
