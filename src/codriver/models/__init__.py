@@ -1,1 +1,6 @@
-"""."""
+"""Plants: one a file; what observers are designed on."""
+
+from codriver.models.longitudinal import intention_model
+from codriver.models.state_space import StateSpace
+
+__all__ = ["StateSpace", "intention_model"]

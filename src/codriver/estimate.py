@@ -1,0 +1,91 @@
+"""What an observer found: signals with standard deviations, validity and provenance; and whether to trust it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from codriver.errors import MissingSignal
+from codriver.observers.observer import Output
+from codriver.signals import Grid, Log, Signal
+from codriver.signals.signal import Array
+from codriver.trust import Check, check_estimate
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate(Mapping[str, Signal]):
+    """The outputs of an observer over a log.
+
+    As a mapping it holds the outputs by name, as Signals on the observer's tick.
+
+    Attributes:
+        observer: its name.
+        grid: the sampled inputs.
+        columns: of the outputs, by name, shape (n,) each.
+        outputs: what they are.
+        measured: standard names of the measurements among the inputs.
+        provenance: what made it.
+        log: the log it was made from.
+    """
+
+    observer: str
+    grid: Grid
+    columns: Mapping[str, Array]
+    outputs: tuple[Output, ...]
+    measured: tuple[str, ...]
+    provenance: Mapping[str, str]
+    log: Log = field(repr=False)
+
+    def __getitem__(self, name: str) -> Signal:
+        if name not in self.columns:
+            raise MissingSignal(
+                f"the estimate has no output '{name}'", f"one of {', '.join(self.columns)}", "correct the name"
+            )
+        return Signal(name, self.grid.time, self.columns[name], self._output(name).unit, self.observer)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+    @property
+    def time(self) -> Array:
+        """The ticks, s, shape (n,)."""
+        return self.grid.time
+
+    @property
+    def estimates(self) -> tuple[Output, ...]:
+        """The outputs that are estimates of signals."""
+        return tuple(o for o in self.outputs if o.role == "estimate" and o.name in self.columns)
+
+    def sd(self, name: str) -> Array | None:
+        """Standard deviations of an estimate, shape (n,); None where the estimator gives none."""
+        return self.columns.get(f"{name}_sd")
+
+    def flag(self, name: str) -> npt.NDArray[np.bool_]:
+        """A flag as booleans, shape (n,); all False where the estimator has no such flag."""
+        return self.columns[name] > 0.5 if name in self.columns else np.zeros(len(self.grid), bool)
+
+    @property
+    def valid(self) -> npt.NDArray[np.bool_]:
+        """Where the model holds, the inputs are known and the estimate has settled, shape (n,)."""
+        return self.flag("valid")
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What was wrong with the recording."""
+        return self.log.faults
+
+    def check(self) -> Check:
+        """Whether to trust the estimate: what the innovations and the flags say."""
+        return check_estimate(self.columns, self.grid, self.measured, self.log)
+
+    def _output(self, name: str) -> Output:
+        return next(o for o in self.outputs if o.name == name)

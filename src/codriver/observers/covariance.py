@@ -1,0 +1,76 @@
+"""Kalman filter algebra on scalars, for steps that are recorded.
+
+Matrices are lists of rows. Constant zeros drop out when the step is recorded, so a sparse F costs what it must.
+Measurements come one row at a time: with independent noises that is the same as all at once, needs no matrix inverse, and
+a row that is missing is left out, which is all that a multi-rate bus asks for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from codriver.kernel import Scalar, select
+from codriver.signals.signal import Array
+
+Matrix = list[list[Scalar]]
+
+
+def predict_covariance(P: Matrix, F: Array, Q: Array) -> Matrix:
+    """F P F' + Q, by its upper triangle.
+
+    Args:
+        P: symmetric, n x n scalars.
+        F, Q: numbers, n x n.
+    """
+    n = len(P)
+    FP = [[_dot([(F[i, k], P[k][j]) for k in range(n)]) for j in range(n)] for i in range(n)]
+    return symmetric([[_dot([(F[j, k], FP[i][k]) for k in range(n)]) + _number(Q[i, j]) for j in range(n)] for i in range(n)])
+
+
+def update_row(
+    x: Sequence[Scalar], P: Matrix, h: Sequence[float], innovation: Scalar, R: Scalar, ok: Scalar
+) -> tuple[list[Scalar], Matrix, Scalar]:
+    """Update with one measured row where ok is not 0; without it, nothing changes.
+
+        s = h P h' + R,  k = P h' / s,  x + k e,  P - k s k'
+
+    Args:
+        x, P: predicted state and covariance.
+        h: the row of C, numbers.
+        innovation: e = y - h x - d u; 0 where the row is missing.
+        R: noise variance of the row.
+        ok: 1 where the row is there.
+
+    Returns:
+        x, P, and the innovation variance s.
+    """
+    n = len(x)
+    Ph = [_dot([(h[k], P[i][k]) for k in range(n)]) for i in range(n)]
+    s = _dot([(h[k], Ph[k]) for k in range(n)]) + R
+    weight = select(ok, 1.0 / s, 0.0)
+    step = weight * innovation
+    return (
+        [x[i] + Ph[i] * step for i in range(n)],
+        symmetric([[P[i][j] - Ph[i] * Ph[j] * weight for j in range(n)] for i in range(n)]),
+        s,
+    )
+
+
+def symmetric(M: Matrix) -> Matrix:
+    """The matrix whose lower triangle is the upper one, so that rounding cannot pull them apart."""
+    return [[M[min(i, j)][max(i, j)] for j in range(len(M))] for i in range(len(M))]
+
+
+def _dot(pairs: list[tuple[float, Scalar]]) -> Scalar:
+    """Sum of number times scalar; zeros left out and ones not multiplied."""
+    total: Scalar = 0.0
+    for number, scalar in pairs:
+        if number == 0:
+            continue
+        term = scalar if number == 1 else float(number) * scalar
+        total = term if isinstance(total, float) and total == 0.0 else total + term
+    return total
+
+
+def _number(x: float) -> float:
+    return float(x)

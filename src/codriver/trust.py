@@ -1,0 +1,176 @@
+"""Whether an estimate can be trusted, from its own innovations.
+
+A filter whose assumptions hold leaves innovations that are as large as it says and that lean to neither side. What is
+looked at, where the estimate is valid:
+
+* share of time that is valid at all;
+* normalised innovation squared (NIS) of each row, mean of e^2 / var(e): 1 when the band is right. Above 1.5 the band is too
+  narrow for that sensor;
+* stretches where the NIS of 1 s is above 16 for a row: wheel slip, a wrong ratio, a sensor fault;
+* the sensors against each other: accelerometer and change of speed must go together, else a sign or a unit is wrong;
+* the accelerometer offset: more than 3 m/s^2 is no road.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from codriver.signals import Grid, Log
+from codriver.signals.signal import Array
+
+WIDE, BAD_STRETCH, STEEP = 1.5, 16.0, 3.0
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing found.
+
+    Attributes:
+        severity: "ok", "warn" or "bad".
+        text: one sentence with the number, and what to do.
+        spans: stretches of time it is about, (start, stop) in s.
+    """
+
+    severity: str
+    text: str
+    spans: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Check:
+    """The verdict.
+
+    Attributes:
+        findings: what was looked at, the worst first.
+        valid_share: share of the ticks that are valid.
+        nis: mean normalised innovation squared of each row, by row.
+    """
+
+    findings: tuple[Finding, ...]
+    valid_share: float
+    nis: Mapping[str, float]
+
+    @property
+    def trusted(self) -> bool:
+        """Whether nothing bad was found."""
+        return all(f.severity != "bad" for f in self.findings)
+
+    @property
+    def verdict(self) -> str:
+        """One line."""
+        bad = sum(f.severity == "bad" for f in self.findings)
+        warn = sum(f.severity == "warn" for f in self.findings)
+        if bad:
+            return f"do not trust it as it is: {bad} bad finding{'s' * (bad > 1)}, {warn} warning{'s' * (warn != 1)}"
+        return f"usable, with {warn} warning{'s' * (warn > 1)}" if warn else "nothing speaks against it"
+
+
+def check_estimate(values: Mapping[str, Array], grid: Grid, measured: tuple[str, ...], log: Log) -> Check:
+    """Look at an estimate; see the module's docstring.
+
+    Args:
+        values: the observer's outputs.
+        grid: its sampled inputs.
+        measured: names of the measurements.
+        log: where it came from; its faults become warnings.
+    """
+    valid = values["valid"] > 0.5 if "valid" in values else np.ones(len(grid), bool)
+    findings = [_validity(values, valid, grid)]
+    nis: dict[str, float] = {}
+    for row in ("acceleration", "speed"):
+        if f"{row}_innovation" in values:
+            findings += _row(row, values, valid, grid, nis)
+    if {"longitudinal_acceleration", "longitudinal_speed"} <= set(measured):
+        findings += _sensors_agree(log)
+    if "acceleration_offset" in values and valid.any():
+        steep = valid & (np.abs(values["acceleration_offset"]) > STEEP)
+        if steep.mean() > 0.01:
+            findings.append(Finding(
+                "bad", f"the accelerometer offset exceeds {STEEP:g} m/s^2 for {steep.mean():.0%} of the time, more than any road: "
+                "is its axis, unit or sign right?", _spans(steep, grid),
+            ))  # fmt: skip
+    findings += [Finding("warn", fault) for fault in log.faults]
+    order = {"bad": 0, "warn": 1, "ok": 2}
+    return Check(tuple(sorted(findings, key=lambda f: order[f.severity])), float(valid.mean()) if valid.size else 0.0, nis)
+
+
+def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid) -> Finding:
+    """How much of the drive is valid, and why the rest is not."""
+    share = float(valid.mean()) if valid.size else 0.0
+    reasons = []
+    if "standstill" in values:
+        reasons.append(f"standing {np.mean(values['standstill'] > 0.5):.0%}")
+    if "inputs_known" in values:
+        reasons.append(f"inputs missing {np.mean(values['inputs_known'] < 0.5):.0%}")
+    text = f"{share:.0%} of {len(grid) * grid.dt:.1f} s is valid" + (f" ({', '.join(reasons)})" if reasons else "")
+    return Finding("bad" if share < 0.05 else "warn" if share < 0.5 else "ok", text, _spans(~valid, grid))
+
+
+def _row(
+    row: str, values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid, nis: dict[str, float]
+) -> list[Finding]:
+    """What the innovations of one measured row say."""
+    used = valid & (values.get(f"{row}_used", np.ones(len(grid))) > 0.5)
+    if used.sum() < 50:
+        return [Finding("warn", f"{row}: only {int(used.sum())} valid innovations, too few to judge the band")]
+    ratio = np.where(used, (values[f"{row}_innovation"] / values[f"{row}_innovation_sd"]) ** 2, 0.0)
+    mean = float(ratio[used].mean())
+    nis[row] = mean
+    findings = []
+    if mean > WIDE:
+        findings.append(Finding(
+            "bad", f"{row}: the innovations are {mean**0.5:.1f} times as wide as the band says (NIS {mean:.2f}); "
+            "the band is too narrow: check vehicle parameters and units, or lower ell",
+        ))  # fmt: skip
+    else:
+        findings.append(Finding("ok", f"{row}: NIS {mean:.2f} (1 is right, below 1 the band is cautious)"))
+    window = max(int(round(1.0 / grid.dt)), 1)
+    kernel = np.ones(window)
+    count = np.convolve(used, kernel, "same")
+    local = np.convolve(ratio, kernel, "same") / np.maximum(count, 1)
+    stretch = (local > BAD_STRETCH) & (count >= 5) & valid
+    if stretch.any():
+        findings.append(Finding(
+            "warn", f"{row}: {stretch.sum() * grid.dt:.1f} s where the innovations are {np.sqrt(local[stretch].max()):.0f} times "
+            "their band: slip, a wrong ratio, or a sensor fault", _spans(stretch, grid),
+        ))  # fmt: skip
+    return findings
+
+
+def _sensors_agree(log: Log) -> list[Finding]:
+    """Whether accelerometer and change of speed go together, over 1-s steps."""
+    if "longitudinal_acceleration" not in log or "longitudinal_speed" not in log:
+        return []
+    grid = log.sample(["longitudinal_acceleration", "longitudinal_speed"], 0.02)
+    a, v = grid.values["longitudinal_acceleration"], grid.values["longitudinal_speed"]
+    steps = len(grid) // 50
+    if steps < 20:
+        return []
+    mean_a = a[: steps * 50].reshape(steps, 50).mean(axis=1)[:-1]
+    dv = np.diff(v[: steps * 50 : 50])
+    good = np.isfinite(mean_a) & np.isfinite(dv)
+    mean_a, dv = mean_a[good], dv[good]
+    if good.sum() < 20 or dv.std() < 0.1 or mean_a.std() == 0:
+        return [Finding("ok", "speed changes too little to hold it against the accelerometer")]
+    slope = float(np.cov(mean_a, dv)[0, 1] / mean_a.var(ddof=1))
+    correlation = float(np.corrcoef(mean_a, dv)[0, 1])
+    said = f"accelerometer and change of speed: correlation {correlation:.2f}, slope {slope:.2f}"
+    if correlation < -0.3:
+        return [Finding("bad", f"{said}; the accelerometer's sign is wrong: set sign = -1 in the names file")]
+    if correlation < 0.5:
+        return [Finding("bad", f"{said}; they hardly go together: wrong axis, wrong clock or wrong signal?")]
+    if not 0.7 < slope < 1.4:
+        return [Finding("warn", f"{said} where 1 is right; check the units of both, and the tyre radius")]
+    return [Finding("ok", f"{said} (1 and 1 are right)")]
+
+
+def _spans(mask: npt.NDArray[np.bool_], grid: Grid) -> tuple[tuple[float, float], ...]:
+    """Stretches of time where a mask holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return tuple(
+        (float(grid.time[i]), float(grid.time[k - 1] + grid.dt)) for i, k in zip(edges[::2], edges[1::2], strict=True)
+    )
