@@ -81,7 +81,7 @@ def find_reader(path: Path) -> Reader:
         if path.is_dir():
             if candidate.folder is not None and candidate.folder(path):
                 return candidate
-        elif path.suffix.lower() in candidate.suffixes:
+        elif path.name.lower().endswith(candidate.suffixes):  # ".csv.gz" is one suffix
             return candidate
     known = sorted({suffix for candidate in formats() for suffix in candidate.suffixes})
     folders = sorted(candidate.title for candidate in formats() if candidate.folder)

@@ -1,0 +1,266 @@
+"""Tables: CSV and Parquet with a time column, one channel a column.
+
+Columns may be of different rates: an empty cell is no sample of its column. NaN is a sample that says "no number",
+except in a column of which a third or more is NaN; that is how tables of several rates look when a tool fills them up.
+"""
+
+from __future__ import annotations
+
+import io
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from codriver.errors import FormatError, LogError
+from codriver.logs.csv_layout import EMPTY_CELLS, inflate, look
+from codriver.logs.recording import Channel, RawSignal, Recording
+from codriver.logs.registry import ReadOptions, reader
+from codriver.logs.table_clock import find_clock, seconds, split_unit
+from codriver.signals.signal import Array
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_MOSTLY_EMPTY = 1 / 3
+
+
+class TableRecording(Recording):
+    """A table: a clock and columns beside it."""
+
+    def __init__(self, path: Path, form: str, clock: str, unit: str, channels: Sequence[Channel]) -> None:
+        self.path, self.format = str(path), form
+        self.faults: list[str] = []
+        self._clock, self._clock_unit = clock, unit
+        self._channels = {channel.name: channel for channel in channels}
+
+    def channels(self) -> Mapping[str, Channel]:
+        """The columns of numbers, by header; the time column is not among them."""
+        return self._channels
+
+    def load(self, names: Iterable[str]) -> dict[str, RawSignal]:
+        """The columns named; a header's unit may be left out where it is unambiguous: "speed" for "speed [km/h]"."""
+        bare: dict[str, list[str]] = {}
+        for header in self._channels:
+            bare.setdefault(split_unit(header)[0], []).append(header)
+        wanted = {}
+        for name in names:
+            if name in self._channels:
+                wanted[name] = name
+            elif len(bare.get(name, ())) == 1:
+                wanted[name] = bare[name][0]
+        if not wanted:
+            return {}
+        columns = self._read(sorted({self._clock, *wanted.values()}))
+        notes: list[str] = []
+        stamps = seconds(columns[self._clock], self._clock_unit, self._clock, notes)
+        for note in notes:
+            self._tell(note)
+        made = {header: _samples(stamps, columns[header]) for header in set(wanted.values())}
+        return {name: RawSignal(*made[header], self._channels[header].unit) for name, header in wanted.items()}
+
+    @abstractmethod
+    def _read(self, headers: list[str]) -> dict[str, pa.ChunkedArray]:
+        """The columns with these headers."""
+
+    def _tell(self, fault: str) -> None:
+        """Add a fault once."""
+        if fault not in self.faults:
+            self.faults.append(fault)
+
+
+def _samples(stamps: Array, column: pa.ChunkedArray) -> tuple[Array, Array]:
+    """Stamps and values of a column's cells that are filled."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    there = pc.is_valid(column).to_numpy()
+    numbers = pc.drop_null(column)
+    if pa.types.is_boolean(column.type):
+        numbers = numbers.cast(pa.uint8())
+    values = np.asarray(numbers.cast(pa.float64(), safe=False).to_numpy(), np.float64)
+    if not there.all():
+        stamps = stamps[there]
+    none = np.isnan(values)
+    if _MOSTLY_EMPTY <= none.mean() < 1 if none.size else False:
+        return stamps[~none], values[~none]
+    return stamps, values
+
+
+class CsvRecording(TableRecording):
+    """A CSV file; only its head is read until columns are asked for."""
+
+    def __init__(self, path: Path) -> None:
+        layout = look(path)
+        self._file, self._layout = path, layout
+        dates = [kind == "text" for kind in layout.kinds]
+        index, unit = find_clock(layout.headers, dates, str(path))
+        channels = [
+            Channel(header, unit)
+            for i, (header, unit, kind) in enumerate(zip(layout.headers, layout.units, layout.kinds, strict=True))
+            if kind != "text" and i != index
+        ]
+        super().__init__(path, "CSV table", layout.headers[index], unit or layout.units[index], channels)
+        self._integer_clock = layout.kinds[index] == "integer"
+        self._text_clock = layout.kinds[index] == "text"
+        numbers = {channel.name for channel in channels} | {layout.headers[index]}
+        skipped = [header for header in layout.headers if header not in numbers]
+        if skipped:
+            self._tell(f"{len(skipped)} columns are no numbers and are left out: {', '.join(skipped[:8])}")
+
+    def _read(self, headers: list[str]) -> dict[str, pa.ChunkedArray]:
+        import pyarrow as pa
+
+        kinds = dict(zip(self._layout.headers, self._layout.kinds, strict=True))
+        types = {h: pa.bool_() if kinds[h] == "bool" else pa.float64() for h in headers}
+        if self._integer_clock:
+            types[self._clock] = pa.int64()  # nanoseconds since 1970 do not fit a double
+        if self._text_clock:
+            types[self._clock] = pa.string()
+        try:
+            table = self._parse(headers, types)
+        except pa.ArrowInvalid:
+            # A cell further down is no number: take the columns as text and sort out cell by cell.
+            table = self._parse(headers, dict.fromkeys(headers, pa.string()))
+            return {h: self._tolerant(table[h], h, types[h]) for h in headers}
+        return {h: table[h] for h in headers}
+
+    def _parse(self, headers: list[str], types: Mapping[str, pa.DataType]) -> pa.Table:
+        """The file through Arrow's CSV parser."""
+        import pyarrow as pa
+        import pyarrow.csv as arrow_csv
+
+        layout = self._layout
+        source: Any = str(self._file)
+        if self._file.suffix.lower() == ".gz":
+            raw, fault = inflate(self._file)
+            if fault:
+                self._tell(fault)
+                raw = raw[: raw.rfind(b"\n") + 1]
+            source = io.BytesIO(raw)
+        bad: list[str] = []
+
+        def skip(row: Any) -> str:
+            bad.append(str(row.text))
+            return "skip"
+
+        try:
+            table = arrow_csv.read_csv(
+                source,
+                read_options=arrow_csv.ReadOptions(
+                    skip_rows=layout.skip,
+                    column_names=list(layout.headers),
+                    encoding=layout.encoding,
+                    block_size=1 << 22,
+                ),
+                parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter, invalid_row_handler=skip),
+                convert_options=arrow_csv.ConvertOptions(
+                    column_types=dict(types),
+                    include_columns=headers,
+                    null_values=EMPTY_CELLS,
+                    strings_can_be_null=True,
+                    decimal_point=layout.decimal,
+                    check_utf8=False,
+                ),
+            )
+        except (pa.ArrowInvalid, UnicodeError) as error:
+            if "conversion error" in str(error):
+                raise
+            expected = f"a table with {len(layout.headers)} columns"
+            raise FormatError(f"{self._file}: {error}", expected, "check the file near the place named") from None
+        if bad:
+            self._tell(f"{len(bad)} rows have too few or too many cells and are left out, the first: '{bad[0][:60]}'")
+        return table
+
+    def _tolerant(self, column: pa.ChunkedArray, header: str, kind: pa.DataType) -> pa.ChunkedArray:
+        """A text column as numbers; cells that are none become empty, and it is told."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        if pa.types.is_string(kind):
+            return column
+        column = pc.utf8_trim_whitespace(column)
+        if self._layout.decimal == ",":
+            column = pc.replace_substring(column, ",", ".")
+        if pa.types.is_boolean(kind):
+            column = pc.replace_substring_regex(pc.utf8_lower(column), "^(true)$", "1")
+            column = pc.replace_substring_regex(column, "^(false)$", "0")
+        # Several patterns by the library's own rule for numbers; "nan" and "inf" count as such.
+        number = r"^[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?$|^[+-]?(nan|inf|NaN|Inf)$"
+        whole = r"^-?\d{1,19}$" if pa.types.is_integer(kind) else number
+        fits = pc.match_substring_regex(column, whole)
+        numbers = pc.match_substring_regex(column, number)
+        if not pc.equal(pc.sum(fits), pc.sum(numbers)).as_py():
+            kind, fits = pa.float64(), numbers
+        wrong = pc.filter(column, pc.invert(fits))
+        wrong = [cell for cell in wrong.to_pylist() if cell not in (None, "")]
+        if wrong:
+            self._tell(
+                f"column '{header}': {len(wrong)} cells are no numbers and are left out, the first: '{wrong[0][:40]}'"
+            )
+        return pc.if_else(fits, column, None).cast(pa.float64() if pa.types.is_boolean(kind) else kind)
+
+
+class ParquetRecording(TableRecording):
+    """A Parquet file; columns are read when asked for. Units and comments come from the fields' metadata."""
+
+    def __init__(self, path: Path) -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            self._table = pq.ParquetFile(path, memory_map=True)
+        except (pa.ArrowInvalid, pa.ArrowException, OSError) as error:
+            raise FormatError(
+                f"{path} is no Parquet file ({str(error)[:120]})",
+                "a complete Parquet file",
+                "a file whose writer was stopped lacks its end and is lost; write it anew",
+            ) from None
+        schema = self._table.schema_arrow
+        if not self._table.metadata.num_rows:
+            raise LogError(f"{path} has {len(schema)} columns and no rows", "rows of data", "check how it was written")
+        dates = [pa.types.is_temporal(field.type) for field in schema]
+        index, unit = find_clock(schema.names, dates, str(path))
+        channels, skipped = [], []
+        numeric = (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean, pa.types.is_decimal)
+        for i, field in enumerate(schema):
+            if i == index:
+                unit = unit or _note(field, "unit")
+            elif any(test(field.type) for test in numeric):
+                own = _note(field, "unit") or split_unit(field.name)[1]
+                channels.append(Channel(field.name, own, _note(field, "comment")))
+            elif not field.name.startswith("__index_level"):
+                skipped.append(field.name)
+        super().__init__(path, "Parquet table", schema.names[index], unit, channels)
+        if skipped:
+            self._tell(f"{len(skipped)} columns are no numbers and are left out: {', '.join(skipped[:8])}")
+
+    def _read(self, headers: list[str]) -> dict[str, pa.ChunkedArray]:
+        import pyarrow as pa
+
+        try:
+            table = self._table.read(columns=headers)
+        except (pa.ArrowException, OSError) as error:
+            raise FormatError(
+                f"{self.path}: {str(error)[:160]}", "a readable Parquet file", "the file is damaged; write it anew"
+            ) from None
+        return {header: table[header] for header in headers}
+
+
+def _note(field: pa.Field, key: str) -> str:
+    """A text from a field's metadata."""
+    return (field.metadata or {}).get(key.encode(), b"").decode("utf-8", "replace")
+
+
+@reader(".csv", ".csv.gz", ".tsv", ".txt", title="CSV table")
+def read_csv(path: Path, options: ReadOptions) -> Recording:
+    """Open a CSV file."""
+    return CsvRecording(path)
+
+
+@reader(".parquet", ".pq", title="Parquet table")
+def read_parquet(path: Path, options: ReadOptions) -> Recording:
+    """Open a Parquet file."""
+    return ParquetRecording(path)
