@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,3 +32,23 @@ class Frames:
 
     def __len__(self) -> int:
         return self.time.size
+
+    def where(self, which: npt.NDArray[np.bool_] | npt.NDArray[np.signedinteger]) -> Frames:
+        """The frames for which the flag is set, shape (n,), or those of the places given, in their order."""
+        return Frames(*(getattr(self, column.name)[which] for column in fields(self)))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Frames]) -> Frames:
+        """The frames of several parts, one behind the other; the wider data gives the width."""
+        width = max((part.data.shape[1] for part in parts), default=8)
+        data = np.zeros((sum(map(len, parts)), width), np.uint8)
+        start = 0
+        for part in parts:
+            data[start : start + len(part), : part.data.shape[1]] = part.data
+            start += len(part)
+        types = (np.float64, np.int16, np.uint32, np.bool_, np.uint8)
+        columns: dict[str, Any] = {
+            column.name: np.concatenate([np.zeros(0, dtype), *(getattr(part, column.name) for part in parts)])
+            for column, dtype in zip(fields(cls)[:-1], types, strict=True)
+        }
+        return cls(**columns, data=data)
