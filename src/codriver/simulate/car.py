@@ -1,0 +1,120 @@
+"""The car: its parameters, and the motion of its mass.
+
+    M v' = tau T_c - F_b - M g sin(alpha) - kappa_1 - kappa_2 v^2           (2017 eq. 2a and 19)
+
+with T_c the torque that passes the clutch (N m, equal to the engine's T_e while the clutch is locked), F_b = c_b p_b,
+kappa_1 and F_b opposing the motion. At standstill they are static friction: the car stays while the other forces are
+smaller than they are.
+
+The numbers of `CarParameters` are those of the 2017 paper where it gives them. They belong to the simulator: an
+estimator gets its own from a vehicle file, and may be wrong about them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from codriver.simulate.powertrain import Powertrain
+
+GRAVITY = 9.80665  # m/s^2
+
+
+@dataclass(frozen=True)
+class CarParameters:
+    """A car with robotised gearbox.
+
+    Attributes:
+        mass: M, kg; the inertia of wheels and engine is counted in.
+        transmission: tau by gear, wheel force per engine torque, 1/m.
+        brake: c_b, N/Pa.
+        pedal: c_r, torque request at the full pedal, N m.
+        rolling: kappa_1, N.
+        drag: kappa_2, kg/m.
+        efficiency: of gearbox and driveline; the engine turns at v tau / efficiency.
+        engine_lag: time constant of the engine's torque, s.
+        engine_inertia: of the engine up to the clutch, kg m^2.
+        friction: engine drag torque at rest, N m.
+        friction_slope: its growth with engine speed, N m s.
+        idle: idle speed, rad/s.
+        cut, open_time, close: lengths of the phases of a gear shift, s: torque cut, clutch open, clutch closing.
+        wheelbase, steering_ratio, understeer: of the steering wheel angle sent on the bus, m, 1, rad s^2/m.
+    """
+
+    mass: float = 1550.0
+    transmission: tuple[float, ...] = (41.0, 22.0, 14.0, 10.0, 8.0)
+    brake: float = 189e-5
+    pedal: float = 325.0
+    rolling: float = 131.0
+    drag: float = 0.283
+    efficiency: float = 0.93
+    engine_lag: float = 0.08
+    engine_inertia: float = 0.18
+    friction: float = 10.0
+    friction_slope: float = 0.06
+    idle: float = 85.0
+    cut: float = 0.16
+    open_time: float = 0.26
+    close: float = 0.38
+    wheelbase: float = 2.6
+    steering_ratio: float = 15.5
+    understeer: float = 0.002
+
+
+class Car:
+    """State of the car.
+
+    Attributes:
+        powertrain: engine, clutch and gearbox.
+        distance, speed: s (m) and v (m/s).
+        acceleration: v' at the present instant, m/s^2.
+    """
+
+    __slots__ = (
+        "_brake",
+        "_drag",
+        "_mass",
+        "_rolling",
+        "acceleration",
+        "distance",
+        "parameters",
+        "powertrain",
+        "speed",
+    )
+
+    def __init__(self, parameters: CarParameters, distance: float = 0.0, speed: float = 0.0) -> None:
+        self.parameters = parameters
+        self.powertrain = Powertrain(parameters, speed)
+        self.distance, self.speed, self.acceleration = distance, speed, 0.0
+        self._mass, self._brake = parameters.mass, parameters.brake
+        self._rolling, self._drag = parameters.rolling, parameters.drag
+
+    def evaluate(self, brake: float, slope: float) -> float:
+        """The acceleration (m/s^2) now, from the powertrain's torque, the brake pressure (Pa) and the slope (rad)."""
+        mass, v = self._mass, self.speed
+        force = self.powertrain.force - mass * GRAVITY * math.sin(slope)
+        friction = self._rolling + self._brake * brake
+        if v > 0.0:
+            force -= friction + self._drag * v * v
+        elif v < 0.0:
+            force += friction + self._drag * v * v
+        elif force > friction:
+            force -= friction
+        elif force < -friction:
+            force += friction
+        else:
+            force = 0.0
+        self.acceleration = force / mass
+        return self.acceleration
+
+    def move(self, dt: float) -> None:
+        """Advance distance and speed by dt seconds at the acceleration last evaluated; friction stops at v = 0."""
+        v, a = self.speed, self.acceleration
+        new = v + dt * a
+        if v * new < 0.0:
+            # It comes to rest within the step; whether it stays is for the next evaluation to find out.
+            self.distance -= 0.5 * v * v / a
+            self.speed = 0.0
+        else:
+            self.distance += dt * (v + 0.5 * dt * a)
+            self.speed = new
