@@ -75,6 +75,7 @@ def _candump(words: Words, lines: Index, names: dict[str, int]) -> Found:
         good[which] &= readable
     bus = _interfaces(words, words.word(lines, 1), names)
     number = (identifier & 0x1FFFFFFF).astype(np.uint32)
+    good &= extended | (number < 1 << 11)
     return Found(lines, keep, good, Frames(time, bus, number, extended, length.astype(np.uint8), data))
 
 
