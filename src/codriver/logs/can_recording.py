@@ -116,7 +116,7 @@ class CanRecording(Recording):
             )
         same = [stream for stream in candidates if stream.bus == best.bus]
         if len(same) > 1:
-            sources = ", ".join(f"{stream.identifier & 0xFF}" for stream in same)
+            sources = ", ".join(f"{source}" for source in sorted(stream.identifier & 0xFF for stream in same))
             taken = best.identifier & 0xFF
             self._tell(f"{message.name} comes from the source addresses {sources}; that from {taken} is taken")
         return best
