@@ -124,7 +124,7 @@ def drive(
         slope = slopes[metre] + (s - metre) * (slopes[metre + 1] - slopes[metre])
         body.evaluate(feet.brake, slope)
         if k % record_every == 0:
-            planned, jerk, _ = plan.at(time)
+            planned, jerk = plan.at(time)
             rows.extend((
                 time, body.distance, body.speed, body.acceleration, slope, feet.accelerator, feet.accelerator_rate,
                 feet.brake, feet.brake_rate, train.request, train.torque, train.passed, train.speed, train.gear,

@@ -64,7 +64,7 @@ class Driver:
         self._leave = (
             self._stops.pop(0).wait if self._standing and self._stops and self._stops[0].at <= distance + 1.0 else 1.0
         )
-        self._wish, self._wish_since, self._ticks = 0.0, 0.0, 0
+        self._wish_sign, self._wish_since, self._ticks = 0, 0.0, 0
         self._braking = self._standing
 
     def decide(self, dt: float, time: float, distance: float, speed: float, gear: int, shifting: bool) -> None:
@@ -104,18 +104,19 @@ class Driver:
                 plan.burst(time, 0.0, 0.6)
             return
         wish, ending = self._wanted(distance, v, stop)
-        if abs(wish - self._wish) > 0.5 * style.patience:
-            self._wish_since = time
-        self._wish = wish
         worth = abs(wish - plan.goal) > style.patience or (ending and wish != plan.goal)
+        sign = 0 if not worth else 1 if wish > plan.goal else -1
+        if sign != self._wish_sign:
+            self._wish_sign, self._wish_since = sign, time
         urgent = wish < plan.goal - 1.2
-        if not worth or (plan.busy(time) and not urgent and not ending):
+        progress = plan.progress(time)
+        if not worth or progress < (0.0 if ending else 0.5 if urgent else 1.0):
             return
         if ending or time - self._wish_since >= style.reaction:
             scatter = 1.0 if ending else max(0.7, 1 + style.scatter * self._random.gauss(0, 1))
-            change = max(-3.6, min(2.6, wish * scatter)) - plan.goal
-            duration = duration_of(change, style.jerk) * max(0.7, 1 + style.scatter * self._random.gauss(0, 1))
-            plan.burst(time, plan.goal + change, duration)
+            goal = max(-3.6, min(2.6, wish * scatter))
+            duration = duration_of(goal - plan.goal, style.jerk)
+            plan.burst(time, goal, duration * max(0.7, 1 + style.scatter * self._random.gauss(0, 1)))
 
     def _wanted(self, distance: float, v: float, stop: float) -> tuple[float, bool]:
         """The acceleration wanted (m/s^2), and whether it is the foreseen end of a manoeuvre."""
@@ -123,11 +124,14 @@ class Driver:
         here = min(int(distance), self._speeds.size - HORIZON - 1)
         ahead = self._speeds[here : here + HORIZON]
         # Part of the way is driven before the braking has built up.
-        lost = v * (style.reaction + 0.3 if now > -0.25 else 0.25)
+        lost = v * (style.reaction + 0.6 if now > -0.25 else 0.35)
         room = np.maximum(self._ahead - lost, 6.0)
-        needs = np.where(ahead < v - 0.5, (ahead * ahead - v * v) / (2.0 * room), 0.0)
+        own = float(ahead[0])
+        needs = np.where(ahead < min(v, own) - 0.5, (ahead * ahead - v * v) / (2.0 * room), 0.0)
         worst = int(needs.argmin())
         need, goal = float(needs[worst]), float(ahead[worst])
+        if v - own > 0.8 and (own - v) / 3.0 < need:  # too fast already: mended within some seconds
+            need, goal = (own - v) / 3.0, own
         if stop < HORIZON:
             for_stop = -v * v / (2.0 * max(stop - 1.0 - lost, 1.0))
             if for_stop < need:
@@ -147,7 +151,7 @@ class Driver:
             return need * 1.05, False
         if need < -style.lift:
             return -min(free, -need), False
-        wanted = float(ahead[: max(2, int(1.5 * v))].min())
+        wanted = float(ahead[: max(2, int(2.5 * v))].min())
         wanted = min(wanted, math.sqrt(1.6 * style.braking * max(stop - 1.0, 0.5)))
         if now > 0.2 and v + now * letting_go >= wanted:
             return 0.0, True
@@ -165,7 +169,7 @@ class Driver:
             feet.want_side, feet.want_brake, feet.want_accelerator = True, HOLD, 0.0
             self._planned_speed, self._braking = 0.0, True
             return
-        planned, _, _ = self.plan.at(time)
+        planned, _ = self.plan.at(time)
         self._planned_speed += dt * (planned + (speed - self._planned_speed) / 2.5)
         table = self._road.slope
         slope = float(table[min(int(distance), table.size - 1)])

@@ -1,0 +1,115 @@
+"""How far an estimate is from a simulated truth.
+
+A causal observer lags, so its error against the truth of the moment is mostly lag: always answering zero can look better.
+The fair reference is delay-matched: the same observer fed with ideal signals of the truth, which lags alike and has no
+noise, no holes and no model error. Both are given, beside the answer zero and the kinematic model on the same log; and the
+share of time in which the truth of the moment lies in the 95 % band.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from codriver.estimate import Estimate
+from codriver.observers import build, design_scaled_gain
+from codriver.observers.intent import INTENTION
+from codriver.observers.jerk import jerk_observer
+from codriver.program import compile
+from codriver.signals import Log, Signal
+from codriver.signals.signal import Array
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """One comparison, over the ticks where the estimate is valid.
+
+    Attributes:
+        what: the quantity, and against what.
+        unit: SI.
+        error: root mean square error.
+        zero: that of answering zero.
+        kinematic: that of the kinematic model's acceleration or jerk.
+        coverage: share of ticks whose truth lies within 1.96 standard deviations; None where that is not the question.
+    """
+
+    what: str
+    unit: str
+    error: float
+    zero: float
+    kinematic: float | None
+    coverage: float | None
+
+
+def judge(estimate: Estimate, truth: Log) -> list[Judgement]:
+    """Hold an estimate of the intention against a simulated truth (`truth_log`).
+
+    Args:
+        estimate: of intent-pedals or intent-torque.
+        truth: with intentional_acceleration, intentional_jerk, planned_jerk, longitudinal_speed,
+            longitudinal_acceleration (dv/dt), acceleration_offset and known_input.
+    """
+    settings = estimate.provenance
+    ell, dt, preset = float(settings["ell"]), estimate.grid.dt, settings["preset"]
+    other = compile(build("kinematic", dt=dt, ell=ell, preset=preset, form=settings["form"])).run(
+        estimate.log, start=float(estimate.time[0]), stop=float(estimate.time[-1])
+    )
+    valid = estimate.valid
+    rivals = {"intentional_acceleration": "longitudinal_acceleration", "intentional_jerk": "longitudinal_jerk"}
+    rows = []
+    for name, unit, label in (
+        ("intentional_acceleration", "m/s^2", "intentional acceleration, the moment's"),
+        ("intentional_jerk", "m/s^3", "intentional jerk, the moment's"),
+    ):
+        rows.append(_row(estimate, other, name, unit, label, at(truth, name, estimate.time), rivals[name], valid, banded=True))
+    for of, label in (("model", "intentional jerk, lag taken out"), ("plan", "driver's planned jerk, lag taken out")):
+        wanted = "intentional_acceleration" if of == "model" else "planned_acceleration"
+        reference = delay_matched(truth, wanted, dt, ell, preset, settings["form"])
+        lagged = np.interp(estimate.time, reference.time, reference.columns["intentional_jerk"])
+        rows.append(
+            _row(estimate, other, "intentional_jerk", "m/s^3", label, lagged, "longitudinal_jerk", valid, banded=False)
+        )
+    offset = at(truth, "acceleration_offset", estimate.time)
+    rows.append(_row(estimate, None, "acceleration_offset", "m/s^2", "accelerometer offset", offset, "", valid, banded=True))
+    return rows
+
+
+def delay_matched(truth: Log, intention: str, dt: float, ell: float, preset: str, form: str) -> Estimate:
+    """The observer's answer to ideal signals whose intention is the truth's signal `intention`.
+
+    The ideal signals are v, v' + o_a, and u = v' - intention.
+    """
+    time, rate = truth["longitudinal_speed"].time, truth["longitudinal_acceleration"].values
+    ones = np.ones_like(time)
+    made: dict[str, tuple[Array, str]] = {
+        "longitudinal_speed": (truth["longitudinal_speed"].values, "m/s"),
+        "longitudinal_acceleration": (rate + truth["acceleration_offset"].values, "m/s^2"),
+        "known_input": (rate - truth[intention].values, "m/s^2"),
+        "direction": (ones, "1"),
+        "inputs_known": (ones, "1"),
+    }
+    log = Log.of([Signal(name, time, values, unit) for name, (values, unit) in made.items()], "ideal signals")
+    observer = jerk_observer(design_scaled_gain(preset, dt, ell), form, INTENTION, "ideal")
+    return compile(observer).run(log)
+
+
+def at(log: Log, name: str, time: Array) -> Array:
+    """A signal of the log at other times, straight between samples."""
+    return np.interp(time, log[name].time, log[name].values)
+
+
+def _row(
+    estimate: Estimate, other: Estimate | None, name: str, unit: str, label: str, truth: Array, rival: str,
+    valid: Array, *, banded: bool,
+) -> Judgement:  # fmt: skip
+    error = estimate.columns[name] - truth
+    sd = estimate.sd(name) if banded else None
+    inside = float(np.mean(np.abs(error[valid]) <= 1.96 * sd[valid])) if sd is not None and valid.any() else None
+    n = min(len(truth), len(other.grid)) if other is not None else 0
+    against = _rms((other.columns[rival][:n] - truth[:n])[valid[:n]]) if other is not None else None
+    return Judgement(label, unit, _rms(error[valid]), _rms(truth[valid]), against, inside)
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x**2))) if x.size else float("nan")
