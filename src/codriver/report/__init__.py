@@ -1,1 +1,13 @@
-"""."""
+"""A report of an estimate: one HTML file with linked plots, a verdict and its reasons, figures and provenance.
+
+    shown      units and names as people read them
+    stretches  where the estimate is not valid and why
+    panels     what is drawn; figure: as traces and layout; pack: the columns, small
+    numbers    figures; words: explanations; tables: both as HTML
+    page       the whole; write: to a file
+    plots.js, page.css
+"""
+
+from codriver.report.write import write_report
+
+__all__ = ["write_report"]

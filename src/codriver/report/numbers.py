@@ -1,0 +1,166 @@
+"""The figures of a report: what the drive was like, how sure the estimate is, how far it is from a reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from codriver.errors import CodriverError
+from codriver.estimate import Estimate
+from codriver.report.panels import SIGMAS, on_ticks
+from codriver.report.shown import clock, number, shown, shown_unit, words
+from codriver.signals import Log
+from codriver.signals.signal import Array
+
+ACCELERATIONS = ("intentional_acceleration", "longitudinal_acceleration")
+JERKS = ("intentional_jerk", "longitudinal_jerk")
+LONGEST_LAG = 2.0  # s
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table of figures."""
+
+    name: str
+    value: str
+    note: str = ""
+
+
+def summary(estimate: Estimate) -> list[Row]:
+    """What the estimate says of the drive, over the valid ticks."""
+    valid, n = estimate.valid, len(estimate.grid)
+    rows = [
+        Row("duration", clock(n * estimate.grid.dt)),
+        Row("distance", _distance(estimate)),
+        Row("valid", f"{valid.mean():.1%}" if n else "–", "share of the duration; all figures below are of this part"),
+    ]
+    for name in (*JERKS, *ACCELERATIONS):
+        if name not in estimate:
+            continue
+        values, unit = shown(name, estimate.columns[name])[valid], shown_unit(name)
+        if not values.size:
+            rows.append(Row(words(name), "–", "nothing valid"))
+            continue
+        low, high = np.percentile(values, [5, 95])
+        rms = float(np.sqrt(np.mean(values**2)))
+        rows.append(Row(f"{words(name)}, RMS", f"{number(rms)} {unit}"))
+        rows.append(Row(f"{words(name)}, 5 % to 95 %", f"{number(low)} to {number(high)} {unit}", "quantiles"))
+        sd = estimate.sd(name)
+        if sd is not None:
+            rows.append(Row(f"{words(name)}, mean standard deviation", f"{number(float(sd[valid].mean()))} {unit}"))
+    lag = expected_lag(estimate)
+    if lag is not None:
+        rows.append(Row("expected delay of the jerk", f"{number(lag)} s", "slow changes show up about this much late"))
+    if "gear_shift" in estimate:
+        shifting = estimate.flag("gear_shift")
+        rows.append(Row("gear shifts", str(int(np.sum(np.diff(shifting.astype(int), prepend=0) > 0)))))
+    for flag, what in (("braking", "braking"), ("both_pedals", "both pedals pressed"), ("standstill", "standing still")):
+        if flag in estimate and n:
+            rows.append(Row(what, f"{estimate.flag(flag).mean():.1%}", "share of the duration"))
+    return rows
+
+
+def expected_lag(estimate: Estimate) -> float | None:
+    """By how much the estimated jerk lags slow changes of the true one, s; None where the design is not known.
+
+    The estimation error obeys e' = (A - L C) e + b j' with b = (0, 0, 0, 1), so for slow changes it is -(A - L C)^-1 b j':
+    its last element is the lag, 0.911 / ell for the 2017 noise and 0.627 / ell for that of 2015. For the pedals alone it
+    is that of the differentiating filter.
+    """
+    from codriver.models import intention_model
+    from codriver.observers import design_scaled_gain
+    from codriver.observers.pedals_only import CORNER_FREQUENCY
+
+    if "intentional_jerk" not in estimate and "longitudinal_jerk" not in estimate:
+        return None
+    settings = estimate.provenance
+    if estimate.observer == "pedals-only":
+        return 1 / (2 * np.pi * CORNER_FREQUENCY)
+    try:
+        design = design_scaled_gain(settings["preset"], float(settings["dt"]), float(settings["ell"]))
+    except (KeyError, ValueError, CodriverError):
+        return None
+    model = intention_model()
+    return float(-np.linalg.solve(model.A - design.L @ model.C, np.array([0.0, 0.0, 0.0, 1.0]))[3])
+
+
+@dataclass(frozen=True)
+class Error:
+    """An estimate against a reference, in display units, over the valid ticks.
+
+    Attributes:
+        name, against: of the estimate and of the reference's signal.
+        unit: display unit.
+        rms, mean: of estimate less reference.
+        lag: shift of the estimate that fits the reference best, s.
+        rms_shifted: RMS with that lag taken out.
+        covered: share of the reference inside the 95 % band; None without a band.
+    """
+
+    name: str
+    against: str
+    unit: str
+    rms: float
+    mean: float
+    lag: float
+    rms_shifted: float
+    covered: float | None
+
+
+def errors(estimate: Estimate, truth: Log | None) -> list[Error]:
+    """How far the estimate is from a reference, for each signal that both have."""
+    pairs = [(o.name, o.name) for o in estimate.estimates]
+    for planned, candidates in (("planned_acceleration", ACCELERATIONS[:1]), ("planned_jerk", JERKS[:1])):
+        pairs += [(name, planned) for name in candidates if name in estimate]
+    found = []
+    for name, against in pairs:
+        reference = on_ticks(truth, against, estimate.time)
+        if reference is None:
+            continue
+        value, right = shown(name, estimate.columns[name]), shown(name, reference)
+        used = estimate.valid & np.isfinite(right) & np.isfinite(value)
+        if used.sum() < 2:
+            continue
+        difference = (value - right)[used]
+        lag, rms_shifted = _best_lag(value, right, used, estimate.grid.dt)
+        sd = estimate.sd(name)
+        covered = None
+        if sd is not None:
+            half = SIGMAS * np.abs(shown(name, sd) - shown(name, np.zeros_like(sd)))
+            covered = float(np.mean(np.abs(difference) <= half[used]))
+        rms = float(np.sqrt(np.mean(difference**2)))
+        found.append(Error(name, against, shown_unit(name), rms, float(difference.mean()), lag, rms_shifted, covered))
+    return found
+
+
+def _best_lag(value: Array, right: Array, used: np.ndarray, dt: float) -> tuple[float, float]:
+    """The lag with the least RMS, among 40 up to LONGEST_LAG, and that RMS."""
+    best = (0.0, float("inf"))
+    for ticks in sorted({round(lag / dt) for lag in np.linspace(0.0, LONGEST_LAG, 41)}):
+        if ticks >= value.size:
+            break
+        both = used[ticks:] & np.isfinite(right[: value.size - ticks])
+        if both.sum() < 0.5 * used.sum():
+            break
+        difference = (value[ticks:] - right[: value.size - ticks])[both]
+        rms = float(np.sqrt(np.mean(difference**2)))
+        if rms < best[1]:
+            best = (ticks * dt, rms)
+    return best
+
+
+def _distance(estimate: Estimate) -> str:
+    """Distance from the estimated speed, or else the measured one."""
+    name = "longitudinal_speed"
+    speed: Array
+    if name in estimate:
+        speed = estimate.columns[name]
+    elif name in estimate.log and len(estimate.log[name]) and len(estimate.grid):
+        time = estimate.time
+        grid = estimate.log.sample([name], estimate.grid.dt, start=float(time[0]), stop=float(time[-1]))
+        speed = np.where(grid.held[name], grid.values[name], 0.0)
+    else:
+        return "unknown: there is no speed"
+    metres = float(np.abs(speed[np.isfinite(speed)]).sum() * estimate.grid.dt)
+    return f"{metres / 1000:.2f} km" if metres >= 1000 else f"{metres:.0f} m"

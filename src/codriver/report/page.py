@@ -1,0 +1,132 @@
+"""The page: one HTML text that needs nothing beside it.
+
+plotly's JavaScript and the columns lie in it compressed (2 MB instead of 5), and a content security policy forbids the page
+to load anything from anywhere.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from importlib.resources import files
+from pathlib import PurePath
+
+from codriver.estimate import Estimate
+from codriver.report import tables
+from codriver.report.figure import Figure, figure
+from codriver.report.numbers import errors, summary
+from codriver.report.pack import MOST, packed
+from codriver.report.panels import panels
+from codriver.report.shown import clock, number
+from codriver.report.tables import text
+from codriver.report.words import how_to_read, what
+from codriver.signals import Log
+
+_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+_FAR = 1e5  # s; times beyond (dates as seconds) are shown from the start of the drive
+_TITLES = {"kinematic": "Vehicle acceleration and jerk"}
+
+
+def page(estimate: Estimate, title: str | None, truth: Log | None, command: str | None) -> str:
+    """The report as HTML; see `codriver.report.write_report` for the arguments."""
+    start = float(estimate.time[0]) if len(estimate.grid) else 0.0
+    origin = start if abs(start) > _FAR else 0.0
+    check = estimate.check()
+    name = PurePath(estimate.log.source.replace("\\", "/")).name
+    title = title or f"{_TITLES.get(estimate.observer, 'Driver intention')}: {name or 'recording in memory'}"
+    rows = summary(estimate)
+    parts = [
+        f"<h1>{text(title)}</h1><p class=lead>{text(what(estimate))}</p>",
+        _facts(estimate),
+        tables.verdict(check, origin),
+        f"<div class=columns><section><h2>Figures</h2>{tables.figures(rows)}</section>"
+        f"<section><h2>How to read this</h2>{''.join(f'<p>{text(p)}</p>' for p in how_to_read(estimate))}</section></div>",
+        _plots(estimate, truth, origin),
+        f"<h2>What to leave out, and why</h2>{tables.distrust(estimate, origin)}",
+    ]
+    if truth is not None:
+        parts.append(f"<h2>Against the reference</h2>{tables.error_table(errors(estimate, truth), truth.source)}")
+    parts += [
+        f"<h2>Signals of the recording</h2>{tables.signals(estimate)}",
+        f"<h2>Faults of the recording</h2>{tables.faults(estimate)}",
+        f"<h2>How this was made</h2>{_provenance(estimate, command)}",
+    ]
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{text(title)}</title>\n<style>\n{_asset('page.css')}</style>\n</head>\n<body>\n{chr(10).join(parts)}\n</body>\n</html>\n"
+    )
+
+
+def _facts(estimate: Estimate) -> str:
+    """The header's facts: estimator and settings, duration and distance."""
+    settings = estimate.provenance
+    rows = {row.name: row.value for row in summary(estimate)[:2]}
+    facts = [
+        ("recording", estimate.log.source or "in memory"), ("estimator", estimate.observer), ("vehicle", settings.get("vehicle", "not needed")),
+        ("ell (larger is quicker and noisier)", settings.get("ell", "")), ("noise preset", settings.get("preset", "")),
+        ("form", settings.get("form", "")), ("tick", f"{number(estimate.grid.dt)} s ({number(1 / estimate.grid.dt)} Hz)"),
+        ("duration", rows["duration"]), ("distance", rows["distance"]),
+    ]  # fmt: skip
+    return "<div class=facts>" + "".join(f"<div><span>{text(k)}</span>{text(v)}</div>" for k, v in facts if v) + "</div>"
+
+
+def _plots(estimate: Estimate, truth: Log | None, origin: float) -> str:
+    """The plots with the key of the shadings, and all that draws them."""
+    stack = panels(estimate, truth) if len(estimate.grid) else []
+    if not stack:
+        return "<h2>Plots</h2><p>There is nothing to draw.</p>"
+    drawn = figure(estimate, stack, origin)
+    notes = []
+    if drawn.thinned:
+        notes.append(
+            f"The drive is long: every curve was thinned out to about {MOST} points by the least and the greatest value of each "
+            f"{clock(2 * len(estimate.grid) * estimate.grid.dt / MOST)}, so no extreme is lost."
+        )
+    if origin:
+        notes.append(f"Time 0 s is {origin:.3f} s of the recording's clock.")
+    spec = json.dumps(drawn.spec, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    return (
+        f"<h2>Plots</h2>{_key(drawn, truth)}{''.join(f'<p><small>{text(n)}</small></p>' for n in notes)}\n"
+        '<div id="plots"></div><noscript><p>The plots need JavaScript; all figures in the tables stand without.</p></noscript>\n'
+        f'<script type="application/json" id="figure">{spec}</script>\n'
+        f'<script type="application/octet-stream" id="columns">{drawn.data}</script>\n'
+        f'<script type="application/octet-stream" id="plotly">{_plotly()}</script>\n<script>\n{_asset("plots.js")}</script>\n'
+    )
+
+
+def _key(drawn: Figure, truth: Log | None) -> str:
+    """The key of the shadings; a box switches each on and off."""
+    labels = []
+    for shade in drawn.shades:
+        fill = f"background:{shade.color}"
+        if shade.hatch:
+            fill = f"background:repeating-linear-gradient(-45deg,#eee 0 4px,{shade.color} 4px 5px)"
+        labels.append(
+            f'<label><input type="checkbox" checked data-shade="{shade.key}"><span class=swatch style="{fill}"></span>'
+            f"{text(shade.words)}</label>"
+        )
+    if truth is not None:
+        labels.append("<span>black, dotted: the reference</span>")
+    return f"<div class=key>{''.join(labels)}</div>" if labels else ""
+
+
+def _provenance(estimate: Estimate, command: str | None) -> str:
+    rows = [(text(key), f"<code>{text(value)}</code>") for key, value in estimate.provenance.items()]
+    rows.append(("recording", f"<code>{text(estimate.log.source or 'in memory')}</code>"))
+    if command:
+        rows.append(("command", f"<code>{text(command)}</code>"))
+    return tables.table((), rows)
+
+
+def _asset(name: str) -> str:
+    return files("codriver.report").joinpath(name).read_text(encoding="utf-8")
+
+
+@cache
+def _plotly() -> str:
+    """plotly's JavaScript, packed."""
+    from plotly.offline import get_plotlyjs
+
+    return packed(get_plotlyjs().encode())

@@ -1,0 +1,274 @@
+"""What is drawn, before anyone draws it: a stack of panels over one time axis, in the order of the 2017 paper's figure 4.
+
+speed; pedals, or torques where there are no pedals; gear; acceleration with the accelerometer; jerk; slope; innovations.
+A panel appears only if the estimate or its log holds something for it, so each estimator gets the report it can fill.
+
+Colours are those of Okabe and Ito, which people with any kind of colour vision tell apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from codriver.estimate import Estimate
+from codriver.report.shown import shown, shown_unit
+from codriver.signals import Log
+from codriver.signals.signal import Array
+
+BLUE, ORANGE, GREEN, SKY, RED, BLACK, GREY = "#0072B2", "#E69F00", "#007A5A", "#56B4E9", "#C84C00", "#1a1a1a", "#757575"
+BAND = "rgba(0,114,178,0.22)"
+SIGMAS = 1.96  # half width of a 95 % band in standard deviations
+GRAVITY = 9.81
+HELD = 0.5  # s over which an innovation is drawn on
+
+
+@dataclass(frozen=True)
+class Line:
+    """One curve: its name in the legend, values on the estimate's ticks in display units (NaN: a gap), and its looks."""
+
+    name: str
+    values: Array
+    color: str
+    width: float = 1.4
+    dash: str = "solid"
+    steps: bool = False
+    right: bool = False  # belongs to the right axis
+    legend: bool = True
+
+
+@dataclass(frozen=True)
+class Band:
+    """A band between two curves."""
+
+    name: str
+    low: Array
+    high: Array
+    color: str = BAND
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One plot of the stack.
+
+    Attributes:
+        title: above the plot, with the unit.
+        unit: at the left axis.
+        height: pixels.
+        items: what is drawn, the lowest first.
+        fit: mask of the ticks to which the axis is fitted.
+        right_unit: at the right axis; empty if there is none.
+        guides: dotted horizontal lines.
+        whole: ticks of the axis at whole numbers only.
+    """
+
+    title: str
+    unit: str
+    height: int
+    items: tuple[Line | Band, ...]
+    fit: npt.NDArray[np.bool_] = field(repr=False)
+    right_unit: str = ""
+    guides: tuple[float, ...] = (0.0,)
+    whole: bool = False
+
+
+def panels(estimate: Estimate, truth: Log | None = None) -> list[Panel]:
+    """The panels that this estimate can fill."""
+    measured = _Measured(estimate)
+    reference = _Truth(estimate, truth)
+    made = [
+        _speed(estimate, measured, reference),
+        _pedals(estimate, measured),
+        _torques(estimate, measured),
+        _gear(estimate, measured),
+        _acceleration(estimate, measured, reference),
+        _jerk(estimate, reference),
+        _slope(estimate, reference),
+        _innovations(estimate),
+    ]
+    return [panel for panel in made if panel is not None]
+
+
+class _Measured:
+    """Signals of the log on the estimate's ticks, in display units, NaN where they are missing or too old."""
+
+    def __init__(self, estimate: Estimate) -> None:
+        self._estimate = estimate
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._estimate.log and len(self._estimate.log[name]) > 0
+
+    def __call__(self, name: str) -> Array:
+        grid = self._estimate.grid
+        if name not in grid.values:
+            # Not among the estimator's inputs, yet good to see.
+            grid = self._estimate.log.sample([name], grid.dt, start=float(grid.time[0]), stop=float(grid.time[-1]))
+        values = np.full(len(self._estimate.grid), np.nan)
+        n = min(len(grid), values.size)
+        values[:n] = np.where(grid.held[name], grid.values[name], np.nan)[:n]
+        return shown(name, values)
+
+
+class _Truth:
+    """Curves of the reference on the estimate's ticks."""
+
+    def __init__(self, estimate: Estimate, truth: Log | None) -> None:
+        self._time, self._truth = estimate.time, truth
+
+    def __call__(self, *names: tuple[str, str, str]) -> list[Line]:
+        """Lines for (name in the truth, legend, dash), where the truth has them."""
+        lines = []
+        for name, legend, dash in names:
+            values = on_ticks(self._truth, name, self._time)
+            if values is not None:
+                lines.append(Line(legend, shown(name, values), BLACK, 1.3, dash))
+        return lines
+
+
+def on_ticks(log: Log | None, name: str, time: Array) -> Array | None:
+    """A signal of a reference at the ticks, straight between its samples, NaN outside; None where there is none."""
+    if log is None or name not in log:
+        return None
+    finite = np.isfinite(log[name].values)
+    if not finite.any():
+        return None
+    return np.interp(time, log[name].time[finite], log[name].values[finite], left=np.nan, right=np.nan)
+
+
+def _estimated(estimate: Estimate, name: str, legend: str, color: str, band: bool = True) -> list[Line | Band]:
+    """Band, the curve where it is valid, and in thin grey where it is not."""
+    value, sd, valid = shown(name, estimate.columns[name]), estimate.sd(name), estimate.valid
+    items: list[Line | Band] = []
+    if sd is not None and band:
+        low, high = (shown(name, estimate.columns[name] + k * SIGMAS * sd) for k in (-1, 1))
+        items.append(Band("95 % band", np.where(valid, low, np.nan), np.where(valid, high, np.nan)))
+    if not valid.all():
+        # One tick of overlap at each end, so that the two curves meet.
+        near = valid & ~(np.roll(~valid, 1) | np.roll(~valid, -1))
+        items.append(Line(f"{legend}, not valid", np.where(near, np.nan, value), "#9a9a9a", 1.0, legend=False))
+    items.append(Line(legend, np.where(valid, value, np.nan), color, 1.6))
+    return items
+
+
+def _speed(estimate: Estimate, measured: _Measured, truth: _Truth) -> Panel | None:
+    name = "longitudinal_speed"
+    items: list[Line | Band] = []
+    if name in measured:
+        items.append(Line("measured", measured(name), GREY, 1.2))
+    if name in estimate:
+        items += _estimated(estimate, name, "estimate", BLUE)
+    items += truth((name, "true", "dot"))
+    return Panel("Speed", "km/h", 130, tuple(items), _everywhere(estimate)) if items else None
+
+
+def _pedals(estimate: Estimate, measured: _Measured) -> Panel | None:
+    items: list[Line] = []
+    if "accelerator_pedal" in measured:
+        items.append(Line("accelerator (left)", measured("accelerator_pedal"), GREEN))
+    if "brake_pressure" in measured:
+        items.append(Line("brake pressure (right)", measured("brake_pressure"), RED, dash="dash", right=True))
+    elif "brake_switch" in measured:
+        items.append(Line("brake switch, 1 pressed (right)", measured("brake_switch"), RED, steps=True, right=True))
+    if not items:
+        return None
+    right = "bar" if "brake_pressure" in measured else "on/off"
+    return Panel("Pedals", "%", 120, tuple(items), _everywhere(estimate), right if items[-1].right else "")
+
+
+def _torques(estimate: Estimate, measured: _Measured) -> Panel | None:
+    if "accelerator_pedal" in measured and "engine_torque_request" not in estimate.grid.values:
+        return None
+    items = [
+        Line(legend, measured(name), color, dash=dash)
+        for name, legend, color, dash in (
+            ("engine_torque_request", "requested by the driver", GREEN, "solid"),
+            ("engine_torque", "actual", BLACK, "dash"),
+        )
+        if name in measured
+    ]
+    return Panel("Torque of engine or motor", shown_unit("engine_torque"), 120, tuple(items), _everywhere(estimate)) if items else None
+
+
+def _gear(estimate: Estimate, measured: _Measured) -> Panel | None:
+    if "gear" not in measured:
+        return None
+    gear = measured("gear")
+    if np.nanmin(gear, initial=9) == np.nanmax(gear, initial=-9):
+        return None  # one gear all the time is told in the table of signals
+    return Panel("Gear", "", 55, (Line("gear", gear, BLACK, 1.4, steps=True, legend=False),), _everywhere(estimate), whole=True)
+
+
+def _acceleration(estimate: Estimate, measured: _Measured, truth: _Truth) -> Panel | None:
+    items: list[Line | Band] = []
+    if "longitudinal_acceleration" in measured:
+        items.append(Line("accelerometer, measured", measured("longitudinal_acceleration"), GREY, 0.9))
+    title = "Acceleration"
+    for name, what, planned in (
+        ("intentional_acceleration", "Intentional acceleration: what the driver asks for", True),
+        ("longitudinal_acceleration", "Acceleration of the vehicle, whoever caused it", False),
+    ):
+        if name in estimate:
+            title = what
+            items += _estimated(estimate, name, "estimate", BLUE)
+            items += truth((name, "true", "dot"), *([("planned_acceleration", "planned by the driver", "dashdot")] if planned else []))
+    return Panel(title, "m/s²", 185, tuple(items), _everywhere(estimate)) if items else None
+
+
+def _jerk(estimate: Estimate, truth: _Truth) -> Panel | None:
+    items: list[Line | Band] = []
+    title = "Jerk"
+    for name, what, planned in (
+        ("intentional_jerk", "Intentional jerk: how the driver changes what he or she asks for", True),
+        ("longitudinal_jerk", "Jerk of the vehicle, whoever caused it", False),
+    ):
+        if name in estimate:
+            title = what
+            items += _estimated(estimate, name, "estimate", BLUE)
+            items += truth((name, "true", "dot"), *([("planned_jerk", "planned by the driver", "dashdot")] if planned else []))
+    return Panel(title, "m/s³", 185, tuple(items), estimate.valid) if items else None
+
+
+def _slope(estimate: Estimate, truth: _Truth) -> Panel | None:
+    if "acceleration_offset" not in estimate:
+        return None
+
+    def slope(offset: Array) -> Array:
+        # As the paper: tan(o_a / g) * 100. Offsets of 1 g and more are no slope; they are cut to keep tan finite.
+        return 100.0 * np.tan(np.clip(offset / GRAVITY, -1.2, 1.2))
+
+    offset, sd = estimate.columns["acceleration_offset"], estimate.sd("acceleration_offset")
+    items: list[Line | Band] = []
+    if sd is not None:
+        low, high = (np.where(estimate.valid, slope(offset + k * SIGMAS * sd), np.nan) for k in (-1, 1))
+        items.append(Band("95 % band", low, high))
+    items.append(Line("estimate", slope(offset), BLUE))
+    items += truth(("road_slope", "true", "dot"))
+    return Panel("Road slope, with the accelerometer's bias in it", "%", 120, tuple(items), estimate.valid)
+
+
+def _innovations(estimate: Estimate) -> Panel | None:
+    items = []
+    for row, legend, color in (("acceleration", "accelerometer", ORANGE), ("speed", "speed", BLUE)):
+        if f"{row}_innovation" not in estimate or f"{row}_innovation_sd" not in estimate:
+            continue
+        sd = estimate.columns[f"{row}_innovation_sd"]
+        used = estimate.flag(f"{row}_used") if f"{row}_used" in estimate else np.ones(sd.size, bool)
+        used &= sd > 0
+        ratio = np.where(used, estimate.columns[f"{row}_innovation"] / np.where(used, sd, 1.0), np.nan)
+        items.append(Line(legend, _carried_on(ratio, round(HELD / estimate.grid.dt)), color, 0.7))
+    title = "Innovations: measured less predicted, in standard deviations"
+    return Panel(title, "", 110, tuple(items), estimate.valid, guides=(-SIGMAS, SIGMAS)) if items else None
+
+
+def _carried_on(values: Array, most: int) -> Array:
+    """Each value carried on over the ticks without one, at most `most` of them."""
+    index = np.where(np.isfinite(values), np.arange(values.size), -1)
+    newest = np.maximum.accumulate(index) if values.size else index
+    there = (newest >= 0) & (np.arange(values.size) - newest <= most)
+    return np.where(there, values[np.maximum(newest, 0)] if values.size else values, np.nan)
+
+
+def _everywhere(estimate: Estimate) -> npt.NDArray[np.bool_]:
+    return np.ones(len(estimate.grid), bool)

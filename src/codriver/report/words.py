@@ -1,0 +1,70 @@
+"""The sentences of a report that explain it to a reader who has never seen one."""
+
+from __future__ import annotations
+
+from codriver.estimate import Estimate
+from codriver.report.numbers import expected_lag
+from codriver.report.shown import words
+
+_WHAT = {
+    "intent-pedals": "The acceleration the driver asks for and its rate of change, from pedals, engine torque, gear, "
+    "accelerometer and speed.",
+    "intent-torque": "The acceleration the driver asks for and its rate of change, from requested and actual torque, "
+    "accelerometer and speed.",
+    "kinematic": "The vehicle's own acceleration and jerk, whoever caused them, from accelerometer and speed alone.",
+    "pedals-only": "Pedals turned into the acceleration and jerk they ask for, without an observer and without a band.",
+}
+
+
+def what(estimate: Estimate) -> str:
+    """One sentence: what was estimated from what."""
+    inputs = ", ".join(words(name) for name in estimate.grid.values if name in estimate.log)
+    return _WHAT.get(estimate.observer, f"Estimated by {estimate.observer} from {inputs}.")
+
+
+def how_to_read(estimate: Estimate) -> list[str]:
+    """Paragraphs on the panels that are there."""
+    said = []
+    if "intentional_jerk" in estimate:
+        said.append(
+            "Intentional acceleration is what the driver asks for by the pedals; the intentional jerk is how fast he or she changes "
+            "that. Near zero the driver keeps to what was decided. A burst is a decision: negative to slow down, positive to "
+            "speed up. Bursts of 1 m/s³ and more are clear manoeuvres; a burst whose band includes zero may be noise."
+        )
+    if "longitudinal_jerk" in estimate:
+        said.append(
+            "Acceleration and jerk are the vehicle's own, with the road's slope and the accelerometer's bias taken out. They hold what "
+            "the driver did, but also gear shifts, the brake's release at a stop and bumps: without pedals or torque these cannot be "
+            "told apart."
+        )
+    lag = expected_lag(estimate)
+    if lag is not None and estimate.observer != "pedals-only":
+        said.append(
+            f"The estimate lags: slow changes of the jerk show up about {lag:.2f} s late. That is the price of a smooth "
+            "estimate; a larger ell makes it quicker and noisier, in inverse proportion."
+        )
+    elif lag is not None:
+        said.append(
+            f"The jerk is the pedals' filtered derivative, about {lag:.2f} s late. There is no band, for there is no observer to judge "
+            "its own error; the pedals' noise and all that the road does are in it."
+        )
+    if any(o.role == "sd" for o in estimate.outputs):
+        said.append(
+            "The band holds the true value 95 % of the time if the model and the vehicle's parameters are right. It "
+            "covers the sensors' noise, not a wrong mass or a wrong coefficient."
+        )
+    if "acceleration_offset" in estimate:
+        said.append(
+            "The road slope is tan(offset / g), the offset being all that the accelerometer shows beyond the change of speed: 1 % is "
+            "0.1 m/s². So it contains the accelerometer's bias and any tilt of its mounting; its changes can be trusted more than its level."
+        )
+    if "acceleration_innovation" in estimate:
+        said.append(
+            "Innovations are what the estimator did not foresee. They should stay between the dotted lines 95 % of the time and lean to "
+            "neither side; where they do not, something happens that the model does not know."
+        )
+    said.append(
+        "Curves are thin and grey where the estimate is not valid. Drag across a plot to zoom, all plots follow; double click for the "
+        "whole drive; drag an axis to move it; click a name in a legend to hide its curve."
+    )
+    return said

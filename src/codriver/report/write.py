@@ -1,0 +1,55 @@
+"""Write a report to a file, whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from codriver.errors import UsageError
+from codriver.estimate import Estimate
+from codriver.report.page import page
+from codriver.signals import Log
+
+
+def write_report(
+    estimate: Estimate,
+    path: str | Path,
+    *,
+    title: str | None = None,
+    truth: Log | None = None,
+    command: str | None = None,
+) -> None:
+    """Write an estimate as one self-contained HTML file: plots, verdict, figures, provenance.
+
+    The file is written beside its final name and renamed, so a reader never meets half of it.
+
+    Args:
+        estimate: what to report.
+        path: of the file; its folder must exist.
+        title: by default the estimator's subject and the recording's file name.
+        truth: a reference to draw and to state errors against: signals by standard names, and planned_acceleration,
+            planned_jerk where the driver's plan is known.
+        command: the command that made it, for the provenance.
+
+    Raises:
+        UsageError: the file cannot be written.
+    """
+    target = Path(path)
+    content = page(estimate, title, truth, command)
+    temporary: Path | None = None
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+        temporary = Path(name)
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+            file.write(content)
+        temporary.chmod(0o644)  # mkstemp's file is for its owner alone
+        temporary.replace(target)
+    except OSError as error:
+        raise UsageError(
+            f"the report {target} cannot be written: {error.strerror or error}", "a file in a folder that exists and may be written",
+            "make the folder, or choose another path",
+        ) from error  # fmt: skip
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
