@@ -18,6 +18,10 @@ from codriver.logs.frames import Frames
 
 # Odd 64-bit multipliers; with n distinct keys one of them fails with a chance of about n^2 / 131072, so all rarely do.
 _MULTIPLIERS = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0xD6E8FEB86659FD93, 0xA0761D6478BD642F)
+# What no key is: they have 49 bits.
+_FREE = np.uint64(2**64 - 1)
+# Frames hashed at a time: what is worked on stays in the cache.
+_BLOCK = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +48,7 @@ def find_streams(frames: Frames) -> list[Stream]:
     """The streams of a trace, by bus and identifier; 11-bit identifiers before 29-bit ones."""
     if not len(frames):
         return []
-    key = frames.identifier.astype(np.uint64)
-    key |= frames.extended.astype(np.uint64) << np.uint64(32)
-    # The bus above the flag, by its bits, so that a channel number below zero is one too.
-    key |= frames.bus.astype(np.uint16).astype(np.uint64) << np.uint64(33)
-    code = _codes(key)
+    code = _codes(frames)
     order = np.argsort(code, kind="stable")
     edges = np.concatenate([[0], np.cumsum(np.bincount(code))])
     streams = []
@@ -60,15 +60,39 @@ def find_streams(frames: Frames) -> list[Stream]:
     return sorted(streams, key=lambda stream: (stream.extended, stream.identifier, stream.bus))
 
 
-def _codes(key: npt.NDArray[np.uint64]) -> npt.NDArray[np.integer]:
-    """A small number for each key, the same for equal keys only."""
-    table = np.zeros(1 << 16, np.uint64)
+def _codes(frames: Frames) -> npt.NDArray[np.integer]:
+    """A small number for each frame, the same for frames of one identifier on one bus and for those only."""
     for multiplier in _MULTIPLIERS:
-        code = ((key * np.uint64(multiplier)) >> np.uint64(48)).astype(np.uint16)
-        table[code] = key
-        if np.array_equal(table[code], key):
+        code = _hash(frames, multiplier)
+        if code is not None:
             return code
-    return np.unique(key, return_inverse=True)[1]
+    return np.unique(_keys(frames, slice(None)), return_inverse=True)[1]
+
+
+def _hash(frames: Frames, multiplier: int) -> npt.NDArray[np.uint16] | None:
+    """The keys' 16-bit hashes; None if two keys share one."""
+    code = np.empty(len(frames), np.uint16)
+    table = np.full(1 << 16, _FREE, np.uint64)
+    for start in range(0, len(frames), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        key = _keys(frames, part)
+        code[part] = (key * np.uint64(multiplier)) >> np.uint64(48)
+        there = table[code[part]]
+        if np.array_equal(there, key):
+            continue
+        # Keys not met before, which is rare after the first block.
+        table[code[part]] = key
+        if not ((there == _FREE) | (there == key)).all() or not np.array_equal(table[code[part]], key):
+            return None
+    return code
+
+
+def _keys(frames: Frames, part: slice) -> npt.NDArray[np.uint64]:
+    """Identifier, flag for 29 bits and bus as one number, for a part of the frames."""
+    key = frames.identifier[part].astype(np.uint64)
+    key |= frames.extended[part].astype(np.uint64) << np.uint64(32)
+    # The bus by its bits, so that a channel number below zero is one too.
+    return key | (frames.bus[part].astype(np.uint16).astype(np.uint64) << np.uint64(33))
 
 
 def name_identifier(identifier: int, extended: bool) -> str:
