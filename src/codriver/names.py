@@ -85,6 +85,8 @@ _ENTRIES = (
     Quantity("intentional_acceleration", "m/s^2", "m/s^2", "a_i", "acceleration the driver asks for"),
     Quantity("intentional_jerk", "m/s^3", "m/s^3", "j_i", "time derivative of the acceleration the driver asks for"),
     Quantity("acceleration_offset", "m/s^2", "m/s^2", "o_a", "accelerometer offset: g sin(slope) + bias"),
+    Quantity("planned_acceleration", "m/s^2", "m/s^2", "a_p", "acceleration a simulated driver planned (truth)"),
+    Quantity("planned_jerk", "m/s^3", "m/s^3", "j_p", "time derivative of planned_acceleration (truth)"),
     Quantity("known_input", "m/s^2", "m/s^2", "u", "what the powertrain adds to the driver's intention"),
 )
 

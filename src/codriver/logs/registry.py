@@ -55,7 +55,11 @@ def reader(
     """
 
     def register(function: ReaderFunction) -> ReaderFunction:
-        _READERS.insert(0, Reader(function, tuple(s.lower() for s in suffixes), folder, title))
+        entry = Reader(function, tuple(s.lower() for s in suffixes), folder, title)
+        if function.__module__.startswith("codriver.logs."):
+            _READERS.append(entry)  # imported on first use, perhaps after a user's own: that one stays ahead
+        else:
+            _READERS.insert(0, entry)
         return function
 
     return register

@@ -1,0 +1,64 @@
+"""The application: commands, and what happens to errors.
+
+Exit codes: 0 done, 1 the data does not allow it, 2 misuse, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from codriver import __version__
+from codriver.cli import check, demo, estimate, export, info
+from codriver.errors import CodriverError
+
+app = typer.Typer(
+    name="codriver",
+    help="What the driver intends and does, estimated from the signals a vehicle already has.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("demo")(demo.demo)
+app.command("info")(info.info)
+app.command("estimate")(estimate.estimate)
+app.add_typer(check.app, name="check")
+app.add_typer(export.app, name="export")
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"codriver {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """What the driver intends and does, estimated from the signals a vehicle already has."""
+
+
+def main() -> None:
+    """Run the command line; errors of the data become a message and an exit code, never a traceback."""
+    try:
+        app()
+    except CodriverError as error:
+        typer.secho(f"codriver: {error}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
+        raise SystemExit(error.exit_code) from None
+    except KeyboardInterrupt:
+        typer.echo("codriver: interrupted; nothing was written", err=True)
+        raise SystemExit(130) from None
+    except BrokenPipeError:
+        raise SystemExit(0) from None
+    except MemoryError:
+        typer.echo("codriver: out of memory; estimate a shorter part of the log", err=True)
+        raise SystemExit(1) from None
+    except OSError as error:
+        typer.echo(f"codriver: {error.strerror or error}: {error.filename or ''}", err=True)
+        raise SystemExit(1) from None

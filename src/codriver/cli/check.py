@@ -1,0 +1,65 @@
+"""codriver check: whether a vehicle file or a names file is right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(help="Check a vehicle file or a names file.", no_args_is_help=True)
+File = Annotated[str, typer.Argument(metavar="FILE", help="A TOML file (for vehicles, a built-in name too).", show_default=False)]
+
+
+@app.command("vehicle")
+def vehicle(file: File) -> None:
+    """Check a vehicle file; show its parameters and which estimators it serves."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    from codriver.cli.terminal import console
+    from codriver.observers.intent import ESTIMATORS
+    from codriver.vehicles import load_vehicle
+    from codriver.vehicles.load import KNOWN
+
+    car = load_vehicle(file)
+    out = console()
+    out.print(f"[bold]{escape(car.name)}[/]: {escape(car.title)}\n{escape(car.source)}\n")
+    table = Table(box=None, pad_edge=False)
+    for column in ("parameter", "value", "sd", "unit", "meaning", "source"):
+        table.add_column(column, justify="right" if column in ("value", "sd") else "left")
+    for name, p in car.parameters.items():
+        table.add_row(name, _numbers(p.value), _numbers(p.sd), p.unit, KNOWN[name].meaning, escape(p.source))
+    out.print(table)
+    out.print()
+    for estimator in ESTIMATORS.values():
+        lacking = [p for p in estimator.parameters if p not in car]
+        out.print(f"  {'[red]no[/] ' if lacking else '[green]yes[/]'} {estimator.name:<14}" + (f" lacks {', '.join(lacking)}" if lacking else ""))
+
+
+@app.command("names")
+def names(file: Annotated[Path, typer.Argument(metavar="FILE", help="A names file (TOML).", show_default=False)]) -> None:
+    """Check a names file; show what it maps."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    from codriver.cli.terminal import console
+    from codriver.logs.names_file import load_names
+    from codriver.names import VOCABULARY
+
+    mapping = load_names(file)
+    table = Table(box=None, pad_edge=False)
+    for column in ("standard name", "unit inside", "source", "unit there", "scale", "offset", "sign"):
+        table.add_column(column)
+    for entry in mapping.entries.values():
+        table.add_row(
+            entry.name, VOCABULARY[entry.name].unit, escape(" + ".join(entry.source)), entry.unit or "(as the source says)",
+            f"{entry.scale:g}", f"{entry.offset:g}", f"{entry.sign:+d}",
+        )  # fmt: skip
+    console().print(table)
+
+
+def _numbers(value: float | tuple[float, ...] | None) -> str:
+    if value is None:
+        return "-"
+    return ", ".join(f"{v:g}" for v in value) if isinstance(value, tuple) else f"{value:g}"

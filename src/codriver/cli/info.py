@@ -1,0 +1,111 @@
+"""codriver info: what a log holds, and what it can feed."""
+
+from __future__ import annotations
+
+import json as json_module
+from typing import Any
+
+import typer
+
+from codriver.cli.options import Bus, Dbc, Json, LogPath, Names, VehicleName
+
+
+def info(
+    log: LogPath, dbc: Dbc = None, names: Names = None, vehicle: VehicleName = None, bus: Bus = None, json: Json = False
+) -> None:
+    """Say what a log holds, which estimators it can feed, what is missing, and which is the best available."""
+    from codriver.errors import LogError
+    from codriver.logs import open_recording
+    from codriver.logs.read import read_recording
+    from codriver.observers.feed import best, feeds
+    from codriver.signals import Log
+    from codriver.vehicles import load_vehicle
+
+    car = load_vehicle(vehicle) if vehicle is not None else None
+    recording = open_recording(log, dbc=dbc, bus=bus)
+    channels = recording.channels()
+    try:
+        signals = read_recording(recording, names)
+    except LogError:
+        if names is not None:
+            raise
+        signals = Log({}, str(log), tuple(recording.faults), tuple(sorted(channels)))  # nothing is mapped yet
+    # Without a vehicle, say what the log alone allows: parameters are told apart from signals.
+    found = feeds(signals, car)
+    fed = [f for f in found if not f.missing]
+    choice = best(signals, car).estimator if any(f.possible for f in found) else None
+    summary: dict[str, Any] = {
+        "log": str(log),
+        "format": recording.format,
+        "from_s": signals.start,
+        "to_s": signals.stop,
+        "signals": [signal.to_dict() for signal in signals.values()],
+        "channels": [{"name": c.name, "unit": c.unit} for c in channels.values()],
+        "unmapped": list(signals.unmapped),
+        "faults": list(signals.faults),
+        "estimators": [
+            {
+                "name": f.estimator,
+                "signals_there": not f.missing,
+                "missing_signals": list(f.missing),
+                "missing_parameters": list(f.lacking),
+                "possible": f.possible,
+                "meaning": f.meaning,
+            }
+            for f in found
+        ],
+        "best": choice,
+        "best_with_a_vehicle": fed[0].estimator if fed else None,
+        "vehicle": car.name if car is not None else None,
+    }
+    if json:
+        typer.echo(json_module.dumps(summary, indent=2, ensure_ascii=False))
+    else:
+        _show(summary)
+
+
+def _show(summary: dict[str, Any]) -> None:
+    """The summary as tables."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    from codriver.cli.terminal import console
+
+    out = console()
+    span = f", {summary['from_s']:.2f} to {summary['to_s']:.2f} s" if summary["signals"] else ""
+    out.print(f"[bold]{escape(summary['log'])}[/]: {escape(summary['format'])}{span}\n")
+    if summary["signals"]:
+        table = Table(box=None, pad_edge=False)
+        for column in ("signal", "unit", "samples", "rate Hz", "minimum", "maximum", "missing", "source"):
+            table.add_column(column, justify="left" if column in ("signal", "unit", "source") else "right", no_wrap=True)
+        for s in summary["signals"]:
+            numbers = [f"{s[key]:.4g}" if s[key] is not None else "-" for key in ("rate_hz", "minimum", "maximum")]
+            table.add_row(s["name"], s["unit"], str(s["samples"]), *numbers, str(s["missing"]), escape(s["source"]))
+        out.print(table)
+    else:
+        out.print("no channel has a standard name: map them in a names file (--names)")
+    if summary["unmapped"]:
+        listed = ", ".join(summary["unmapped"][:60]) + (", ..." if len(summary["unmapped"]) > 60 else "")
+        out.print(f"\nnot mapped ({len(summary['unmapped'])}): {escape(listed)}")
+    for fault in summary["faults"]:
+        out.print(f"[yellow]warn[/] {escape(fault)}")
+    out.print("\n[bold]estimators[/]")
+    for e in summary["estimators"]:
+        if e["possible"]:
+            out.print(f"  [green]yes[/]  {e['name']:<14} {e['meaning']}")
+            continue
+        lacks = [f"signals: {', '.join(e['missing_signals'])}"] if e["missing_signals"] else []
+        if e["missing_parameters"]:
+            given = summary["vehicle"] is not None
+            lacks.append(f"vehicle parameters: {', '.join(e['missing_parameters'])}" if given else "a vehicle (--vehicle)")
+        mark = "[yellow]part[/]" if e["signals_there"] else "[red]no[/]  "
+        out.print(f"  {mark} {e['name']:<14} lacks {'; '.join(lacks)}")
+    if summary["best"]:
+        out.print(f"\nbest available: [bold]{summary['best']}[/]", end="")
+        if summary["best_with_a_vehicle"] != summary["best"]:
+            out.print(f"; with a vehicle file, {summary['best_with_a_vehicle']}", end="")
+        out.print()
+    elif summary["best_with_a_vehicle"]:
+        out.print(f"\nbest available with a vehicle file: [bold]{summary['best_with_a_vehicle']}[/]")
+    else:
+        out.print("\nno estimator can be fed: kinematic, the least, needs longitudinal_acceleration and longitudinal_speed")

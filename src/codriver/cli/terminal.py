@@ -1,0 +1,65 @@
+"""What the terminal shows: progress on standard error, the summary on standard output."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+_STYLE = {"ok": "green", "warn": "yellow", "bad": "red"}
+
+
+def command_line() -> str:
+    """The command as typed, for provenance; the program by its name and not its path."""
+    return "codriver " + shlex.join(sys.argv[1:])
+
+
+@contextmanager
+def working(show: bool) -> Iterator[Callable[[str], None]]:
+    """A spinner with the present stage, on standard error; call what it gives with each stage's name."""
+    if not show or not sys.stderr.isatty():
+        yield lambda text: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("")
+        yield lambda text: progress.update(task, description=text)
+
+
+def console() -> Any:
+    """Standard output; as wide as it needs where it is no terminal, so that nothing is cut."""
+    from rich.console import Console
+
+    return Console(highlight=False, soft_wrap=not sys.stdout.isatty())
+
+
+def say(summary: dict[str, Any]) -> None:
+    """Show the summary of an estimate."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    out = console()
+    settings = summary["settings"]
+    parts = [f"{key} {settings[key]}" for key in ("vehicle", "ell", "preset", "form") if key in settings]
+    out.print(f"[bold]{summary['estimator']}[/] on {escape(summary['log'])}" + (f": {', '.join(parts)}" if parts else ""))
+    if summary["why"]:
+        out.print(f"chosen as {escape(summary['why'])}")
+    distance = f", {summary['distance_m'] / 1000:.2f} km" if summary["distance_m"] is not None else ""
+    extra = f", {summary['gear_shifts']} gear shifts, braking {summary['braking_share']:.0%}" if summary["gear_shifts"] else ""
+    out.print(f"{summary['duration_s']:.1f} s{distance} at {summary['rate_hz']:g} Hz, valid {summary['valid_share']:.0%}{extra}\n")
+    table = Table(box=None, pad_edge=False)
+    for column in ("estimate", "unit", "rms", "5 %", "95 %", "mean sd"):
+        table.add_column(column, justify="left" if column in ("estimate", "unit") else "right")
+    for name, row in summary["estimates"].items():
+        numbers = [f"{row[key]:.3f}" if row[key] is not None else "-" for key in ("rms", "p5", "p95", "mean_sd")]
+        table.add_row(name, str(row["unit"]), *numbers)
+    out.print(table)
+    out.print(f"\n[bold]verdict[/]: {summary['verdict']}")
+    for finding in summary["findings"]:
+        out.print(f"  [{_STYLE[finding['severity']]}]{finding['severity']:<4}[/] {escape(finding['text'])}")
+    out.print(f"\nwrote {escape(summary['result'])}" + (f" and {escape(summary['report'])}" if summary["report"] else ""))

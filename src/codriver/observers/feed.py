@@ -1,0 +1,78 @@
+"""Which estimators a set of signals can feed, with a vehicle or without."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from codriver.errors import MissingSignal
+from codriver.observers.intent import ESTIMATORS, needed_signals
+from codriver.signals import Log
+from codriver.vehicles import Vehicle
+
+NICE_RATES = (20.0, 25.0, 50.0, 100.0, 200.0)
+
+
+@dataclass(frozen=True)
+class Feed:
+    """Whether one estimator can be fed.
+
+    Attributes:
+        estimator: its name.
+        missing: standard signals it needs and the log lacks.
+        lacking: parameters it needs and the vehicle lacks; all of them where no vehicle was given.
+        meaning: what it estimates.
+    """
+
+    estimator: str
+    missing: tuple[str, ...]
+    lacking: tuple[str, ...]
+    meaning: str
+
+    @property
+    def possible(self) -> bool:
+        """Whether log and vehicle together feed it."""
+        return not self.missing and not self.lacking
+
+
+def feeds(signals: Collection[str], vehicle: Vehicle | None) -> list[Feed]:
+    """Every estimator, in order of preference, with what stands in its way."""
+    return [
+        Feed(
+            name,
+            tuple(s for s in needed_signals(name, vehicle) if s not in signals),
+            tuple(p for p in estimator.parameters if vehicle is None or p not in vehicle),
+            estimator.meaning,
+        )
+        for name, estimator in ESTIMATORS.items()
+    ]
+
+
+def best(signals: Collection[str], vehicle: Vehicle | None, where: str = "the log") -> Feed:
+    """The best estimator that can be fed.
+
+    Raises:
+        MissingSignal: none can; the message says what each lacks.
+    """
+    found = feeds(signals, vehicle)
+    for feed in found:
+        if feed.possible:
+            return feed
+    lacks = "; ".join(
+        f"{f.estimator} lacks {', '.join(f.missing + tuple(f'[{p}] of the vehicle' for p in f.lacking))}" for f in found
+    )
+    raise MissingSignal(
+        f"{where} feeds no estimator: {lacks}",
+        "at least longitudinal_acceleration and longitudinal_speed (kinematic)",
+        "map more signals in a names file; `codriver info LOG` lists the channels of the log",
+    )
+
+
+def suggest_rate(log: Log, names: Collection[str]) -> float:
+    """The rate at which to run, Hz: the quickest of the signals named, rounded up to a usual rate, from 20 to 200 Hz.
+
+    The Kalman form uses each value on the tick it arrives, so a rate above that of a signal costs nothing but time.
+    """
+    rates = [log[name].rate for name in names if name in log and len(log[name]) > 1]
+    quickest = max((rate for rate in rates if rate == rate), default=NICE_RATES[0])
+    return next((rate for rate in NICE_RATES if rate >= 0.95 * quickest), NICE_RATES[-1])

@@ -1,0 +1,130 @@
+"""Vehicle files, names files and units: what is right is converted, what is wrong is told all at once."""
+
+import math
+
+import pytest
+
+import codriver as cd
+from codriver.errors import NamesError, UnitError, VehicleError
+from codriver.logs.names_file import parse_names
+from codriver.names import VOCABULARY
+from codriver.units import _FAST, to_si
+from codriver.vehicles import built_in_vehicles
+from codriver.vehicles.load import parse_vehicle
+
+HEAD = 'name = "x"\ntitle = "X"\nsource = "test"\n'
+
+
+def test_papers_cars():
+    """2017 section IV and 2015 section V."""
+    car = cd.load_vehicle("bisoffi2017")
+    assert car.number("mass") == 1550
+    assert car.numbers("transmission") == (41, 22, 14, 10, 8)
+    assert car.number("brake_coefficient") == pytest.approx(189e-5)  # N/bar -> N/Pa
+    assert car.number("pedal_coefficient") == pytest.approx(325)  # N m per percent -> N m
+    old = cd.load_vehicle("bisoffi2015")
+    assert (old.number("mass"), old.numbers("transmission")) == (1500, (13, 6.9, 4.3, 3.1, 2.5))
+
+
+@pytest.mark.parametrize("name", built_in_vehicles())
+def test_every_value_has_a_source(name):
+    car = cd.load_vehicle(name)
+    assert car.source
+    assert all(p.source and p.unit for p in car.parameters.values())
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[mas]\nvalue=1\nunit='kg'\nsource='s'", "did you mean 'mass'"),
+        ("[mass]\nvalue=1550\nsource='s'", "lacks 'unit'"),
+        ("[mass]\nvalue=1550\nunit='m'\nsource='s'", "same kind"),
+        ("[mass]\nvalue=1550\nunit='furlongkg'\nsource='s'", "not known"),
+        ("[mass]\nvalue=1.55\nunit='kg'\nsource='s'", "outside"),
+        ("[mass]\nvalue=[1,2]\nunit='kg'\nsource='s'", "one number"),
+        ("[mass]\nvalue=nan\nunit='kg'\nsource='s'", "one number"),
+        ("[mass]\nvalue=true\nunit='kg'\nsource='s'", "one number"),
+        ("[mass]\nvalue=1550\nunit='kg'\nsd=-1\nsource='s'", "sd must be"),
+        ("[mass]\nvalue=1550\nunit='kg'\nsource='s'\ncolour='red'", "unknown key 'colour'"),
+        ("mass = 3", "not a parameter"),
+        ("[transmission]\nvalue=[41, 'x']\nunit='1/m'\nsource='s'", "one number per gear"),
+        ("not toml at all", "not TOML"),
+    ],
+)
+def test_wrong_vehicle_files(text, said):
+    with pytest.raises(VehicleError, match=said.replace("(", r"\(")):
+        parse_vehicle(HEAD + text, "file.toml")
+
+
+def test_all_faults_at_once():
+    with pytest.raises(VehicleError) as raised:
+        parse_vehicle("[mass]\nvalue=1\n[drag]\nvalue=1\nunit='s'\nsource='x'", "f")
+    assert all(word in str(raised.value) for word in ("'name' is missing", "[mass] lacks", "[drag]"))
+
+
+def test_unknown_vehicle():
+    with pytest.raises(VehicleError, match="did you mean 'bisoffi2017'"):
+        cd.load_vehicle("bisofi2017")
+
+
+@pytest.mark.parametrize(
+    ("unit", "target", "x", "wanted"),
+    [
+        ("km/h", "m/s", 36, 10), ("mph", "m/s", 1, 0.44704), ("%", "1", 50, 0.5), ("percent", "1", 50, 0.5),
+        ("bar", "Pa", 2, 2e5), ("g", "m/s^2", 1, 9.80665), ("deg", "rad", 180, math.pi), ("rpm", "rad/s", 60, 2 * math.pi),
+        ("Nm", "N*m", 3, 3), ("m/s2", "m/s^2", 3, 3), ("N/bar", "N/Pa", 189, 189e-5), ("degC", "K", 0, 273.15), ("", "1", 1, 1),
+        ("psi", "Pa", 1, 6894.757293168), ("°/s", "rad/s", 180, math.pi),
+    ],
+)  # fmt: skip
+def test_units(unit, target, x, wanted):
+    factor, offset = to_si(unit, target)
+    assert factor * x + offset == pytest.approx(wanted)
+
+
+def test_quick_table_is_pints():
+    """The table that spares pint's start says what pint says."""
+    import pint
+
+    registry = pint.UnitRegistry()
+    spell = {"%": "percent", "1": "dimensionless", "g": "standard_gravity", "rpm": "rpm", "kph": "km/h", "1/min": "rpm"}
+    for (unit, target), factor in _FAST.items():
+        if (unit, target) == ("rad", "%"):
+            continue  # a slope in percent: small angles only, pint has no such unit
+        quantity = registry.Quantity(1.0, spell.get(unit, unit)).to(spell.get(target, target))
+        assert quantity.magnitude == pytest.approx(factor, rel=1e-12), (unit, target)
+
+
+def test_wrong_units():
+    with pytest.raises(UnitError, match="same kind"):
+        to_si("kg", "m/s")
+    with pytest.raises(UnitError, match="not known"):
+        to_si("blargh", "m/s")
+
+
+@pytest.mark.parametrize("entry", VOCABULARY.values(), ids=list(VOCABULARY))
+def test_vocabulary_units(entry):
+    """Every unit is known, and the one shown is of the same kind."""
+    if (entry.unit, entry.display) != ("rad", "%"):
+        to_si(entry.display, entry.unit)
+    assert entry.low < entry.high
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[speed]\nsource='a'", "not a standard signal name"),
+        ("[longitudinal_sped]\nsource='a'", "did you mean 'longitudinal_speed'"),
+        ("[gear]\nunit='1'", "source must be"),
+        ("[gear]\nsource=3", "source must be"),
+        ("[gear]\nsource='a'\nscale='big'", "scale must be a number"),
+        ("[gear]\nsource='a'\nscale=0", "scale must not be 0"),
+        ("[gear]\nsource='a'\nsign=2", "sign must be 1 or -1"),
+        ("[longitudinal_speed]\nsource='a'\nunit='kg'", "same kind"),
+        ("[gear]\nsource='a'\nfactor=2", "unknown key 'factor'"),
+        ("", "no signal is mapped"),
+        ("[[[", "not TOML"),
+    ],
+)
+def test_wrong_names_files(text, said):
+    with pytest.raises(NamesError, match=said):
+        parse_names(text, "names.toml")
