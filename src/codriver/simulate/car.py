@@ -49,12 +49,12 @@ class CarParameters:
     drag: float = 0.283
     efficiency: float = 0.93
     engine_lag: float = 0.08
-    engine_inertia: float = 0.18
+    engine_inertia: float = 0.14
     friction: float = 10.0
     friction_slope: float = 0.06
     idle: float = 85.0
     cut: float = 0.16
-    open_time: float = 0.26
+    open_time: float = 0.3
     close: float = 0.38
     wheelbase: float = 2.6
     steering_ratio: float = 15.5

@@ -16,6 +16,7 @@ import numpy as np
 from codriver.signals.signal import Array
 from codriver.simulate.car import Car, CarParameters
 from codriver.simulate.driver import Driver
+from codriver.simulate.powertrain import T_MAX
 from codriver.simulate.road import Road
 from codriver.simulate.styles import STYLES, Style
 
@@ -38,7 +39,7 @@ COLUMNS = (
     "passed",  # T_c, torque through the clutch, N m
     "engine_speed",  # rad/s
     "gear",
-    "clutch",  # 0 closed, 1 open
+    "clutch",  # travel, 0 closed, 1 open
     "shifting",  # 1 up, -1 down, 0 no shift
     "planned_acceleration",  # m/s^2
     "planned_jerk",  # m/s^3
@@ -75,6 +76,16 @@ class Trace:
     def tau(self) -> Array:
         """Transmission coefficient of the engaged gear, 1/m."""
         return np.array(self.car.transmission)[self.columns["gear"].astype(int) - 1]
+
+    @property
+    def clutch_share(self) -> Array:
+        """Share of the engine's torque that the clutch could not pass: 0 all passes, 1 none does.
+
+        The `clutch` column is the travel of the release bearing, which is not the same: at half travel the clutch still
+        passes all of a small torque.
+        """
+        capacity = T_MAX * (1.0 - self.columns["clutch"]) ** 3
+        return 1.0 - np.minimum(1.0, capacity / np.maximum(np.abs(self.columns["torque"]), 20.0))
 
     @property
     def braking(self) -> Array:

@@ -33,7 +33,7 @@ MESSAGES: tuple[Message, ...] = (
     ), "ESC"),
     Message("Gearbox", 0x1A0, 50, 5, (
         Field("TCU_GearEngaged", "gear", 3, 4, motorola=True, comment="1 to 5"),
-        Field("TCU_ClutchTravel", "clutch", 15, 8, 0.5, 0, "%", 100.0, motorola=True, comment="0 closed, 100 open"),
+        Field("TCU_ClutchOpen", "clutch", 15, 8, 0.5, 0, "%", 100.0, motorola=True, comment="torque held back"),
         Field("TCU_ShiftActive", "shift", 16, 1, motorola=True),
         _counter(35, "TCU_Counter", motorola=True),
     ), "TCU"),
@@ -71,7 +71,7 @@ STANDARD: dict[str, tuple[str, ...]] = {
     "engine_torque_request": ("EngineData.ENG_TorqueDriver",),
     "engine_speed": ("EngineData.ENG_Speed",),
     "gear": ("Gearbox.TCU_GearEngaged",),
-    "clutch": ("Gearbox.TCU_ClutchTravel",),
+    "clutch": ("Gearbox.TCU_ClutchOpen",),
     "steering_wheel_angle": ("Steering.EPS_WheelAngle",),
     "yaw_rate": ("Dynamics.ESC_YawRate",),
     "lateral_acceleration": ("Dynamics.ESC_AccelY",),

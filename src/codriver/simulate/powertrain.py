@@ -123,7 +123,7 @@ class Powertrain:
         elif phase == OPEN:
             self.clutch = min(1.0, self.clutch + dt / 0.06)
             target = v * self._tau[self._next - 1] / p.efficiency + (8.0 if self.direction < 0 else 0.0)
-            wanted = max(-45.0, min(130.0, p.engine_inertia * (target - self.speed) / 0.07))
+            wanted = max(-60.0, min(130.0, p.engine_inertia * (target - self.speed) / 0.06))
             if self._elapsed >= 0.5 * p.open_time:
                 self.gear = self._next
             if self._elapsed >= p.open_time:

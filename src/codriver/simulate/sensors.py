@@ -14,6 +14,7 @@ Noise is white per sample; its standard deviation does not depend on the rate.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -43,6 +44,8 @@ class SensorParameters:
         switch: pressure at which the brake switch closes, Pa; it opens at two thirds of it.
         torque_noise, torque_step: N m.
         track: distance of left and right wheels, m.
+        clutch: what the gearbox's unit reports as clutch: "torque", the share of the engine's torque that does not pass
+            (it knows its clutch), or "travel", the position of the release bearing.
     """
 
     bias: float = 0.05
@@ -66,6 +69,7 @@ class SensorParameters:
     torque_noise: float = 0.3
     torque_step: float = 0.5
     track: float = 1.5
+    clutch: Literal["torque", "travel"] = "torque"
 
 
 WHEELS = {"front_left": (1, 1), "front_right": (1, -1), "rear_left": (0, 1), "rear_right": (0, -1)}
@@ -77,7 +81,6 @@ _PLAIN = {
     "engine_torque_request": "request",
     "engine_speed": "engine_speed",
     "gear": "gear",
-    "clutch": "clutch",
 }
 # Hz, of the signals without a bus.
 _RATES = {
@@ -160,6 +163,8 @@ class Instruments:
             return v * curvature
         if name == "steering_wheel_angle":
             return car.steering_ratio * (car.wheelbase * curvature + car.understeer * v * v * curvature)
+        if name == "clutch":
+            return trace.clutch_share if p.clutch == "torque" else trace["clutch"]
         if name == "brake_pressure":
             return trace["brake"] + p.brake_zero
         if name == "brake_switch":

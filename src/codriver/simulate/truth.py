@@ -90,7 +90,7 @@ def truth_log(trace: Trace, *, bias: float = 0.05, rate: float = 100.0) -> Log:
         "engine_speed": trace["engine_speed"],
         "clutch_torque": trace["passed"],
         "gear": trace["gear"],
-        "clutch": trace["clutch"],
+        "clutch": trace.clutch_share,
         "shift": trace["shifting"],
         "braking": trace.braking,
     }
