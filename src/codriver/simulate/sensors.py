@@ -54,7 +54,7 @@ class SensorParameters:
     pitch_gain: float = 0.0015
     pitch_frequency: float = 1.4
     pitch_damping: float = 0.35
-    ring_share: float = 0.3
+    ring_share: float = 0.5
     ring_frequency: float = 5.5
     ring_damping: float = 0.10
     speed_noise: float = 0.012
