@@ -1,11 +1,11 @@
 """A report of an estimate: one HTML file with linked plots, a verdict and its reasons, figures and provenance.
 
-    shown      units and names as people read them
-    stretches  where the estimate is not valid and why
-    panels     what is drawn; figure: as traces and layout; pack: the columns, small
-    numbers    figures; words: explanations; tables: both as HTML
-    page       the whole; write: to a file
-    plots.js, page.css
+* shown: units and names as people read them
+* stretches: where the estimate is not valid and why
+* panels: what is drawn; figure: as traces and layout; pack: the columns, small
+* numbers: figures; words: explanations; tables: both as HTML
+* page: the whole; write: to a file
+* page.css, plots.js: how it looks, and what draws the plots
 """
 
 from codriver.report.write import write_report

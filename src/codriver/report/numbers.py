@@ -45,7 +45,7 @@ def summary(estimate: Estimate) -> list[Row]:
         low, high = np.percentile(values, [5, 95])
         rms = float(np.sqrt(np.mean(values**2)))
         rows.append(Row(f"{words(name)}, RMS", f"{number(rms)} {unit}"))
-        rows.append(Row(f"{words(name)}, 5 % to 95 %", f"{number(low)} to {number(high)} {unit}", "quantiles"))
+        rows.append(Row(f"{words(name)}, 5% to 95%", f"{number(low)} to {number(high)} {unit}", "quantiles"))
         sd = estimate.sd(name)
         if sd is not None:
             rows.append(Row(f"{words(name)}, mean standard deviation", f"{number(float(sd[valid].mean()))} {unit}"))
@@ -55,7 +55,11 @@ def summary(estimate: Estimate) -> list[Row]:
     if "gear_shift" in estimate:
         shifting = estimate.flag("gear_shift")
         rows.append(Row("gear shifts", str(int(np.sum(np.diff(shifting.astype(int), prepend=0) > 0)))))
-    for flag, what in (("braking", "braking"), ("both_pedals", "both pedals pressed"), ("standstill", "standing still")):
+    for flag, what in (
+        ("braking", "braking"),
+        ("both_pedals", "both pedals pressed"),
+        ("standstill", "standing still"),
+    ):
         if flag in estimate and n:
             rows.append(Row(what, f"{estimate.flag(flag).mean():.1%}", "share of the duration"))
     return rows
@@ -64,9 +68,9 @@ def summary(estimate: Estimate) -> list[Row]:
 def expected_lag(estimate: Estimate) -> float | None:
     """By how much the estimated jerk lags slow changes of the true one, s; None where the design is not known.
 
-    The estimation error obeys e' = (A - L C) e + b j' with b = (0, 0, 0, 1), so for slow changes it is -(A - L C)^-1 b j':
-    its last element is the lag, 0.911 / ell for the 2017 noise and 0.627 / ell for that of 2015. For the pedals alone it
-    is that of the differentiating filter.
+    The estimation error obeys e' = (A - L C) e + b j' with b = (0, 0, 0, 1), so for slow changes it is
+    -(A - L C)^-1 b j': its last element is the lag, 0.911 / ell for the 2017 noise, 0.627 / ell for that of 2015. For
+    the pedals alone it is that of the differentiating filter.
     """
     from codriver.models import intention_model
     from codriver.observers import design_scaled_gain
@@ -95,7 +99,7 @@ class Error:
         rms, mean: of estimate less reference.
         lag: shift of the estimate that fits the reference best, s.
         rms_shifted: RMS with that lag taken out.
-        covered: share of the reference inside the 95 % band; None without a band.
+        covered: share of the reference inside the 95% band; None without a band.
     """
 
     name: str

@@ -1,12 +1,11 @@
 """Columns of numbers made small enough for a page, without losing what one sees.
 
-A column of n ticks is kept whole up to MOST points. Beyond, it is cut into buckets and each bucket keeps its least and its
-greatest value, in the order in which they came, so that no extreme is lost; bounds of a band keep the one that makes the
-band wider. The page thins out again for what is in view, so zooming in shows the kept points one by one.
+A column of n ticks is kept whole up to MOST points. Beyond, it is cut into buckets and each bucket keeps its least and
+its greatest value, in the order in which they came, so that no extreme is lost; bounds of a band keep the one that
+makes the band wider. The page thins out again for what is in view, so zooming in shows the kept points one by one.
 
 The numbers are rounded to a step that is 10^-4 of their usual spread, differences are taken, and the four bytes of each
-difference are stored apart from each other: what then remains for gzip are long runs of zeros. A jerk at 100 Hz takes about
-one byte a sample. `plots.js` undoes this.
+difference are stored apart from each other: what then remains for gzip are long runs of zeros. `plots.js` undoes this.
 """
 
 from __future__ import annotations
@@ -52,13 +51,13 @@ class Pack:
         first = self.start + (dx / 2 - self.dt / 2 if size > 1 else 0.0)
         coded, base, step = _code(kept)
         self._coded.append(coded)
-        self.columns.append({"n": kept.size, "x0": first, "dx": dx, "base": base, "step": step})
+        self.columns.append({"n": kept.size, "x0": first, "dx": dx, "size": size, "base": base, "step": step})
         return len(self.columns) - 1
 
     @property
-    def thinned(self) -> bool:
-        """Whether any column lost points."""
-        return any(column["dx"] > self.dt * 1.01 for column in self.columns)
+    def bucket(self) -> float:
+        """Longest time for which a column keeps its extremes only, s; the tick if no column lost points."""
+        return max((column["size"] * self.dt for column in self.columns), default=self.dt)
 
     def text(self) -> str:
         """All columns, as base64 of gzip."""
@@ -95,7 +94,7 @@ def thin_out(values: Array, keep: str = "extremes") -> tuple[Array, int]:
 
 
 def _code(values: Array) -> tuple[npt.NDArray[np.uint32], float, float]:
-    """Differences of the rounded values as unsigned numbers (0, -1, 1, -2, … are 0, 1, 2, 3, …), the base and the step."""
+    """Differences of the rounded values (0, -1, 1, -2, … as 0, 1, 2, 3, …), the base and the step."""
     finite = values[np.isfinite(values)]
     base, step = 0.0, 1.0
     if finite.size:
@@ -104,7 +103,7 @@ def _code(values: Array) -> tuple[npt.NDArray[np.uint32], float, float]:
         whole = high - low < 2**20 and bool(np.all(finite == np.round(finite)))
         base = low
         if high > low and not whole:
-            # Of the usual spread, so that one wild value does not coarsen the rest; of the span, so that 31 bits suffice.
+            # Of the usual spread, so that one wild value does not coarsen the rest; of the span, so that 31 bits do.
             step = max(1e-4 * spread if spread > 0 else (high - low) / 3e4, (high - low) / 2**30)
     rounded = np.full(values.size, _MISSING, dtype=np.int64)
     there = np.isfinite(values)

@@ -1,7 +1,7 @@
 """The page: one HTML text that needs nothing beside it.
 
-plotly's JavaScript and the columns lie in it compressed (2 MB instead of 5), and a content security policy forbids the page
-to load anything from anywhere.
+plotly's JavaScript and the columns lie in it compressed (2 MB instead of 5), and a content security policy forbids the
+page to load anything from anywhere.
 """
 
 from __future__ import annotations
@@ -14,16 +14,20 @@ from pathlib import PurePath
 from codriver.estimate import Estimate
 from codriver.report import tables
 from codriver.report.figure import Figure, figure
-from codriver.report.numbers import errors, summary
-from codriver.report.pack import MOST, packed
+from codriver.report.numbers import Row, errors, summary
+from codriver.report.pack import packed
 from codriver.report.panels import panels
-from codriver.report.shown import clock, number
+from codriver.report.shown import number
 from codriver.report.tables import text
 from codriver.report.words import how_to_read, what
 from codriver.signals import Log
 
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 _FAR = 1e5  # s; times beyond (dates as seconds) are shown from the start of the drive
+_HINT = (
+    "<p class=screen>Drag across a plot to zoom; all plots follow. Double click for the whole drive. "
+    '<a href="#how">How to read this</a></p>'
+)
 _TITLES = {"kinematic": "Vehicle acceleration and jerk"}
 
 
@@ -35,13 +39,14 @@ def page(estimate: Estimate, title: str | None, truth: Log | None, command: str 
     name = PurePath(estimate.log.source.replace("\\", "/")).name
     title = title or f"{_TITLES.get(estimate.observer, 'Driver intention')}: {name or 'recording in memory'}"
     rows = summary(estimate)
+    reading = "".join(f"<p>{text(p)}</p>" for p in how_to_read(estimate))
     parts = [
         f"<h1>{text(title)}</h1><p class=lead>{text(what(estimate))}</p>",
-        _facts(estimate),
+        _facts(estimate, rows),
         tables.verdict(check, origin),
-        f"<div class=columns><section><h2>Figures</h2>{tables.figures(rows)}</section>"
-        f"<section><h2>How to read this</h2>{''.join(f'<p>{text(p)}</p>' for p in how_to_read(estimate))}</section></div>",
         _plots(estimate, truth, origin),
+        f"<div class=columns><section><h2>Figures</h2>{tables.figures(rows)}</section>"
+        f'<section id="how"><h2>How to read this</h2>{reading}</section></div>',
         f"<h2>What to leave out, and why</h2>{tables.distrust(estimate, origin)}",
     ]
     if truth is not None:
@@ -59,17 +64,21 @@ def page(estimate: Estimate, title: str | None, truth: Log | None, command: str 
     )
 
 
-def _facts(estimate: Estimate) -> str:
+def _facts(estimate: Estimate, rows: list[Row]) -> str:
     """The header's facts: estimator and settings, duration and distance."""
     settings = estimate.provenance
-    rows = {row.name: row.value for row in summary(estimate)[:2]}
+    values = {row.name: row.value for row in rows}
     facts = [
-        ("recording", estimate.log.source or "in memory"), ("estimator", estimate.observer), ("vehicle", settings.get("vehicle", "not needed")),
-        ("ell (larger is quicker and noisier)", settings.get("ell", "")), ("noise preset", settings.get("preset", "")),
-        ("form", settings.get("form", "")), ("tick", f"{number(estimate.grid.dt)} s ({number(1 / estimate.grid.dt)} Hz)"),
-        ("duration", rows["duration"]), ("distance", rows["distance"]),
+        ("recording", estimate.log.source or "in memory"), ("estimator", estimate.observer),
+        ("vehicle", settings.get("vehicle", "not needed")),
+        ("ell (high: quick, noisy)", settings.get("ell", "")), ("noise preset", settings.get("preset", "")),
+        ("form", settings.get("form", "")),
+        ("tick", f"{number(estimate.grid.dt)} s ({number(1 / estimate.grid.dt)} Hz)"),
+        ("duration", values["duration"]), ("distance", values["distance"]),
     ]  # fmt: skip
-    return "<div class=facts>" + "".join(f"<div><span>{text(k)}</span>{text(v)}</div>" for k, v in facts if v) + "</div>"
+    return (
+        "<div class=facts>" + "".join(f"<div><span>{text(k)}</span>{text(v)}</div>" for k, v in facts if v) + "</div>"
+    )
 
 
 def _plots(estimate: Estimate, truth: Log | None, origin: float) -> str:
@@ -79,20 +88,22 @@ def _plots(estimate: Estimate, truth: Log | None, origin: float) -> str:
         return "<h2>Plots</h2><p>There is nothing to draw.</p>"
     drawn = figure(estimate, stack, origin)
     notes = []
-    if drawn.thinned:
+    if drawn.bucket > estimate.grid.dt:
         notes.append(
-            f"The drive is long: every curve was thinned out to about {MOST} points by the least and the greatest value of each "
-            f"{clock(2 * len(estimate.grid) * estimate.grid.dt / MOST)}, so no extreme is lost."
+            f"The drive is long: each curve was thinned out to the least and the greatest value of every "
+            f"{number(drawn.bucket, 2)} s. No extreme is lost; what is faster than that cannot be zoomed into."
         )
     if origin:
         notes.append(f"Time 0 s is {origin:.3f} s of the recording's clock.")
     spec = json.dumps(drawn.spec, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     return (
-        f"<h2>Plots</h2>{_key(drawn, truth)}{''.join(f'<p><small>{text(n)}</small></p>' for n in notes)}\n"
-        '<div id="plots"></div><noscript><p>The plots need JavaScript; all figures in the tables stand without.</p></noscript>\n'
+        f"<h2>Plots</h2>{_HINT}{_key(drawn, truth)}{''.join(f'<p><small>{text(n)}</small></p>' for n in notes)}\n"
+        '<div id="plots"></div>'
+        "<noscript><p>The plots need JavaScript; all figures in the tables stand without.</p></noscript>\n"
         f'<script type="application/json" id="figure">{spec}</script>\n'
         f'<script type="application/octet-stream" id="columns">{drawn.data}</script>\n'
-        f'<script type="application/octet-stream" id="plotly">{_plotly()}</script>\n<script>\n{_asset("plots.js")}</script>\n'
+        f'<script type="application/octet-stream" id="plotly">{_plotly()}</script>\n'
+        f"<script>\n{_asset('plots.js')}</script>\n"
     )
 
 

@@ -1,14 +1,16 @@
-"""What is drawn, before anyone draws it: a stack of panels over one time axis, in the order of the 2017 paper's figure 4.
+"""What is drawn, before anyone draws it: panels over one time axis, ordered as in figure 4 of the 2017 paper.
 
-speed; pedals, or torques where there are no pedals; gear; acceleration with the accelerometer; jerk; slope; innovations.
+speed; pedals, or torques where there are no pedals; gear; acceleration and accelerometer; jerk; slope; innovations.
 A panel appears only if the estimate or its log holds something for it, so each estimator gets the report it can fill.
 
-Colours are those of Okabe and Ito, which people with any kind of colour vision tell apart.
+Colours follow those of Okabe and Ito, which people with any kind of colour vision tell apart.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -18,16 +20,17 @@ from codriver.report.shown import shown, shown_unit
 from codriver.signals import Log
 from codriver.signals.signal import Array
 
-BLUE, ORANGE, GREEN, SKY, RED, BLACK, GREY = "#0072B2", "#E69F00", "#007A5A", "#56B4E9", "#C84C00", "#1a1a1a", "#757575"
+BLUE, ORANGE, GREEN, RED, BLACK, GREY = "#0072B2", "#E69F00", "#007A5A", "#C84C00", "#1a1a1a", "#757575"
+PURPLE = "#8E2F86"
 BAND = "rgba(0,114,178,0.22)"
-SIGMAS = 1.96  # half width of a 95 % band in standard deviations
+SIGMAS = 1.96  # half width of a 95% band in standard deviations
 GRAVITY = 9.81
 HELD = 0.5  # s over which an innovation is drawn on
 
 
 @dataclass(frozen=True)
 class Line:
-    """One curve: its name in the legend, values on the estimate's ticks in display units (NaN: a gap), and its looks."""
+    """One curve: its name in the legend, its values on the ticks in display units (NaN: a gap), and its looks."""
 
     name: str
     values: Array
@@ -123,7 +126,8 @@ class _Truth:
         for name, legend, dash in names:
             values = on_ticks(self._truth, name, self._time)
             if values is not None:
-                lines.append(Line(legend, shown(name, values), BLACK, 1.3, dash))
+                color = PURPLE if dash == "dashdot" else BLACK
+                lines.append(Line(legend, shown(name, values), color, 1.3, dash))
         return lines
 
 
@@ -137,18 +141,26 @@ def on_ticks(log: Log | None, name: str, time: Array) -> Array | None:
     return np.interp(time, log[name].time[finite], log[name].values[finite], left=np.nan, right=np.nan)
 
 
-def _estimated(estimate: Estimate, name: str, legend: str, color: str, band: bool = True) -> list[Line | Band]:
-    """Band, the curve where it is valid, and in thin grey where it is not."""
-    value, sd, valid = shown(name, estimate.columns[name]), estimate.sd(name), estimate.valid
+def _estimated(estimate: Estimate, name: str, shape: Callable[[Array], Array] | None = None) -> list[Line | Band]:
+    """Band, the curve where it is valid, and in thin grey where it is not.
+
+    Args:
+        estimate: what is drawn.
+        name: of the output.
+        shape: from SI to what is shown; by default the display unit.
+    """
+    show = shape or partial(shown, name)
+    raw, sd, valid = estimate.columns[name], estimate.sd(name), estimate.valid
+    value = show(raw)
     items: list[Line | Band] = []
-    if sd is not None and band:
-        low, high = (shown(name, estimate.columns[name] + k * SIGMAS * sd) for k in (-1, 1))
-        items.append(Band("95 % band", np.where(valid, low, np.nan), np.where(valid, high, np.nan)))
+    if sd is not None:
+        low, high = (np.where(valid, show(raw + k * SIGMAS * sd), np.nan) for k in (-1, 1))
+        items.append(Band("95% band", low, high))
     if not valid.all():
-        # One tick of overlap at each end, so that the two curves meet.
-        near = valid & ~(np.roll(~valid, 1) | np.roll(~valid, -1))
-        items.append(Line(f"{legend}, not valid", np.where(near, np.nan, value), "#9a9a9a", 1.0, legend=False))
-    items.append(Line(legend, np.where(valid, value, np.nan), color, 1.6))
+        # The grey curve reaches one tick into the other, so that the two meet.
+        inner = valid & np.roll(valid, 1) & np.roll(valid, -1)
+        items.append(Line("estimate, not valid", np.where(inner, np.nan, value), "#9a9a9a", 1.0, legend=False))
+    items.append(Line("estimate", np.where(valid, value, np.nan), BLUE, 1.6))
     return items
 
 
@@ -158,9 +170,9 @@ def _speed(estimate: Estimate, measured: _Measured, truth: _Truth) -> Panel | No
     if name in measured:
         items.append(Line("measured", measured(name), GREY, 1.2))
     if name in estimate:
-        items += _estimated(estimate, name, "estimate", BLUE)
+        items += _estimated(estimate, name)
     items += truth((name, "true", "dot"))
-    return Panel("Speed", "km/h", 130, tuple(items), _everywhere(estimate)) if items else None
+    return Panel("Speed", shown_unit(name), 130, tuple(items), _everywhere(estimate)) if items else None
 
 
 def _pedals(estimate: Estimate, measured: _Measured) -> Panel | None:
@@ -188,7 +200,9 @@ def _torques(estimate: Estimate, measured: _Measured) -> Panel | None:
         )
         if name in measured
     ]
-    return Panel("Torque of engine or motor", shown_unit("engine_torque"), 120, tuple(items), _everywhere(estimate)) if items else None
+    if not items:
+        return None
+    return Panel("Torque of engine or motor", shown_unit("engine_torque"), 120, tuple(items), _everywhere(estimate))
 
 
 def _gear(estimate: Estimate, measured: _Measured) -> Panel | None:
@@ -197,7 +211,8 @@ def _gear(estimate: Estimate, measured: _Measured) -> Panel | None:
     gear = measured("gear")
     if np.nanmin(gear, initial=9) == np.nanmax(gear, initial=-9):
         return None  # one gear all the time is told in the table of signals
-    return Panel("Gear", "", 55, (Line("gear", gear, BLACK, 1.4, steps=True, legend=False),), _everywhere(estimate), whole=True)
+    line = Line("gear", gear, BLACK, 1.4, steps=True, legend=False)
+    return Panel("Gear", "", 58, (line,), _everywhere(estimate), guides=(), whole=True)
 
 
 def _acceleration(estimate: Estimate, measured: _Measured, truth: _Truth) -> Panel | None:
@@ -211,8 +226,8 @@ def _acceleration(estimate: Estimate, measured: _Measured, truth: _Truth) -> Pan
     ):
         if name in estimate:
             title = what
-            items += _estimated(estimate, name, "estimate", BLUE)
-            items += truth((name, "true", "dot"), *([("planned_acceleration", "planned by the driver", "dashdot")] if planned else []))
+            items += _estimated(estimate, name)
+            items += truth((name, "true", "dot"), *([_planned("planned_acceleration")] if planned else []))
     return Panel(title, "m/s²", 185, tuple(items), _everywhere(estimate)) if items else None
 
 
@@ -225,9 +240,13 @@ def _jerk(estimate: Estimate, truth: _Truth) -> Panel | None:
     ):
         if name in estimate:
             title = what
-            items += _estimated(estimate, name, "estimate", BLUE)
-            items += truth((name, "true", "dot"), *([("planned_jerk", "planned by the driver", "dashdot")] if planned else []))
+            items += _estimated(estimate, name)
+            items += truth((name, "true", "dot"), *([_planned("planned_jerk")] if planned else []))
     return Panel(title, "m/s³", 185, tuple(items), estimate.valid) if items else None
+
+
+def _planned(name: str) -> tuple[str, str, str]:
+    return name, "planned by the driver", "dashdot"
 
 
 def _slope(estimate: Estimate, truth: _Truth) -> Panel | None:
@@ -238,12 +257,7 @@ def _slope(estimate: Estimate, truth: _Truth) -> Panel | None:
         # As the paper: tan(o_a / g) * 100. Offsets of 1 g and more are no slope; they are cut to keep tan finite.
         return 100.0 * np.tan(np.clip(offset / GRAVITY, -1.2, 1.2))
 
-    offset, sd = estimate.columns["acceleration_offset"], estimate.sd("acceleration_offset")
-    items: list[Line | Band] = []
-    if sd is not None:
-        low, high = (np.where(estimate.valid, slope(offset + k * SIGMAS * sd), np.nan) for k in (-1, 1))
-        items.append(Band("95 % band", low, high))
-    items.append(Line("estimate", slope(offset), BLUE))
+    items = _estimated(estimate, "acceleration_offset", slope)
     items += truth(("road_slope", "true", "dot"))
     return Panel("Road slope, with the accelerometer's bias in it", "%", 120, tuple(items), estimate.valid)
 
@@ -257,9 +271,10 @@ def _innovations(estimate: Estimate) -> Panel | None:
         used = estimate.flag(f"{row}_used") if f"{row}_used" in estimate else np.ones(sd.size, bool)
         used &= sd > 0
         ratio = np.where(used, estimate.columns[f"{row}_innovation"] / np.where(used, sd, 1.0), np.nan)
-        items.append(Line(legend, _carried_on(ratio, round(HELD / estimate.grid.dt)), color, 0.7))
-    title = "Innovations: measured less predicted, in standard deviations"
-    return Panel(title, "", 110, tuple(items), estimate.valid, guides=(-SIGMAS, SIGMAS)) if items else None
+        carried_on = _carried_on(ratio, round(HELD / estimate.grid.dt))
+        items.append(Line(legend, np.where(estimate.valid, carried_on, np.nan), color, 0.9))
+    title = "Innovations: measured less predicted, in standard deviations (sd)"
+    return Panel(title, "sd", 110, tuple(items), estimate.valid, guides=(-SIGMAS, SIGMAS)) if items else None
 
 
 def _carried_on(values: Array, most: int) -> Array:

@@ -54,9 +54,12 @@ def number(value: float, digits: int = 3) -> str:
         return "0"
     size = abs(value)
     if not 1e-4 <= size < 1e6:
-        return f"{value:.{digits - 1}e}"
-    decimals = max(digits - 1 - int(np.floor(np.log10(size))), 0)
-    return f"{value:.{decimals}f}"
+        written = f"{value:.{digits - 1}e}"
+    else:
+        written = f"{value:.{max(digits - 1 - int(np.floor(np.log10(size))), 0)}f}"
+        if size == round(size):
+            written = f"{value:.0f}"
+    return written.replace("-", "−")
 
 
 def clock(seconds: float) -> str:

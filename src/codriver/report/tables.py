@@ -43,25 +43,32 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numeric: Sequence[
 def verdict(check: Check, origin: float) -> str:
     """The verdict with its findings, the worst first."""
     worst = check.findings[0].severity if check.findings else "ok"
-    title = {"bad": "Do not trust this estimate as it is", "warn": "Usable, with care", "ok": "Nothing speaks against this estimate"}
+    title = {
+        "bad": "Do not trust this estimate as it is",
+        "warn": "Usable, with care",
+        "ok": "Nothing speaks against this estimate",
+    }
     items = []
     for finding in check.findings:
         where = ""
         if finding.spans and finding.severity != "ok":
             where = f" <span class=where>At {_listed(finding.spans, origin)}.</span>"
         items.append(
-            f'<li class="{finding.severity}"><b class=tag>{SEVERITY[finding.severity]}</b> <span>{text(_sentence(finding.text))}{where}</span></li>'
+            f'<li class="{finding.severity}"><b class=tag>{SEVERITY[finding.severity]}</b> '
+            f"<span>{text(_sentence(finding.text))}{where}</span></li>"
         )
     return (
         f'<section class="verdict {worst}" id="verdict"><h2>{title[worst]}</h2>'
-        f"<p>Verdict: {text(check.verdict)}. {check.valid_share:.1%} of the time is valid.</p><ul>{''.join(items)}</ul></section>"
+        f"<p>Verdict: {text(check.verdict)}. {check.valid_share:.1%} of the time is valid.</p>"
+        f"<ul>{''.join(items)}</ul></section>"
     )
 
 
 def distrust(estimate: Estimate, origin: float) -> str:
     """What not to use and why: silent signals and stretches that are not valid."""
     items = [
-        f"<li><b>{text(words(name))} missing</b> {_listed(holes, origin)}</li>" for name, holes in gaps(estimate).items()
+        f"<li><b>{text(words(name))} missing</b> {_listed(holes, origin)}</li>"
+        for name, holes in gaps(estimate).items()
     ]
     by_reason: dict[str, list[Stretch]] = {}
     for stretch in not_valid(estimate):
@@ -69,17 +76,20 @@ def distrust(estimate: Estimate, origin: float) -> str:
     for reason, stretches in by_reason.items():
         total = sum(s.span[1] - s.span[0] for s in stretches)
         items.append(
-            f"<li><b>not valid: {text(reason)}</b>, {total:.1f} s in all: {_listed([s.span for s in stretches], origin)}</li>"
+            f"<li><b>not valid: {text(reason)}</b>, {total:.1f} s in all: "
+            f"{_listed([s.span for s in stretches], origin)}</li>"
         )
     if not items:
-        return "<p>No stretch has to be left out: every tick is valid and no signal is silent for longer than it may be held.</p>"
-    return f"<p>Leave these stretches out of any evaluation. A click zooms the plots to a stretch.</p><ul>{''.join(items)}</ul>"
+        return "<p>Nothing: every tick is valid and no signal is silent for longer than it may be held.</p>"
+    lead = "Leave these stretches out of any evaluation. A click zooms the plots to a stretch."
+    return f"<p>{lead}</p><ul>{''.join(items)}</ul>"
 
 
 def figures(rows: Iterable[Row]) -> str:
     """The table of figures."""
     return table(
-        ("figure", "value", ""), ((text(r.name), f"<b>{text(r.value)}</b>", f"<small>{text(r.note)}</small>") for r in rows)
+        ("figure", "value", ""),
+        ((text(r.name), f"<b>{text(r.value)}</b>", f"<small>{text(r.note)}</small>") for r in rows),
     )
 
 
@@ -87,7 +97,15 @@ def error_table(found: Sequence[Error], source: str) -> str:
     """Errors against the reference."""
     if not found:
         return "<p>A reference was given, but it shares no signal with the valid part of the estimate.</p>"
-    head = ("estimate", "against", "RMS error", "mean error", "best lag", "RMS error, lag taken out", "inside the 95 % band")
+    head = (
+        "estimate",
+        "against",
+        "RMS error",
+        "mean error",
+        "best lag",
+        "RMS error, lag taken out",
+        "inside the 95% band",
+    )
     rows = [
         (
             text(words(e.name)), text(words(e.against)), f"{number(e.rms)} {e.unit}", f"{number(e.mean)} {e.unit}",
@@ -96,9 +114,9 @@ def error_table(found: Sequence[Error], source: str) -> str:
         for e in found
     ]  # fmt: skip
     return (
-        f"<p>Against the reference {text(source) or '(in memory)'} (dotted in the plots), over the valid ticks. The lag is the shift "
-        "that fits best; an observer always lags, so the error with the lag taken out says how well the shape is met. The band "
-        "is for noise alone: it knows nothing of the lag.</p>" + table(head, rows, (2, 3, 4, 5, 6))
+        f"<p>Against the reference “{text(source or 'in memory')}” (dotted in the plots), over the valid ticks. The lag "
+        "is the shift that fits best; an observer always lags, so the error with the lag taken out says how well the "
+        "shape is met.</p>" + table(head, rows, (2, 3, 4, 5, 6))
     )  # fmt: skip
 
 
@@ -110,12 +128,16 @@ def signals(estimate: Estimate) -> str:
     for name in (*used, *rest):
         signal = estimate.log[name]
         finite = shown(name, signal.values[np.isfinite(signal.values)], signal.unit if name in VOCABULARY else None)
-        low_high = f"{number(float(finite.min()), 4)} to {number(float(finite.max()), 4)}" if finite.size else "no values"
+        low_high = (
+            f"{number(float(finite.min()), 4)} to {number(float(finite.max()), 4)}" if finite.size else "no values"
+        )
         role = "measurement" if name in estimate.measured else "input" if name in used else "not used"
         missing = signal.values.size - finite.size
         rows.append((
-            text(words(name)), role, text(signal.source) or "–", f"{len(signal)}" + (f" ({missing} missing)" if missing else ""),
-            f"{number(signal.rate)} Hz" if np.isfinite(signal.rate) else "–", low_high, text(shown_unit(name, signal.unit)) or "–",
+            text(words(name)), role, text(signal.source) or "–",
+            f"{len(signal)}" + (f" ({missing} missing)" if missing else ""),
+            f"{number(signal.rate)} Hz" if np.isfinite(signal.rate) else "–", low_high,
+            text(shown_unit(name, signal.unit)) or "–",
         ))  # fmt: skip
     absent = [name for name in estimate.grid.values if name not in estimate.log]
     note = f"<p>Optional inputs the recording lacks: {text(', '.join(map(words, absent)))}.</p>" if absent else ""

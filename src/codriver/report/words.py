@@ -27,44 +27,48 @@ def how_to_read(estimate: Estimate) -> list[str]:
     said = []
     if "intentional_jerk" in estimate:
         said.append(
-            "Intentional acceleration is what the driver asks for by the pedals; the intentional jerk is how fast he or she changes "
-            "that. Near zero the driver keeps to what was decided. A burst is a decision: negative to slow down, positive to "
-            "speed up. Bursts of 1 m/s³ and more are clear manoeuvres; a burst whose band includes zero may be noise."
+            "Intentional acceleration is what the driver asks for by the pedals; the intentional jerk is how fast "
+            "he or she changes that. Near zero the driver keeps to what was decided. A burst is a decision: "
+            "negative to slow down, positive to speed up. Bursts of 1 m/s³ and more are clear manoeuvres; a burst "
+            "whose band includes zero may be noise."
         )
     if "longitudinal_jerk" in estimate:
         said.append(
-            "Acceleration and jerk are the vehicle's own, with the road's slope and the accelerometer's bias taken out. They hold what "
-            "the driver did, but also gear shifts, the brake's release at a stop and bumps: without pedals or torque these cannot be "
-            "told apart."
+            "Acceleration and jerk are the vehicle's own, with the road's slope and the accelerometer's bias "
+            "taken out. They hold what the driver did, but also gear shifts, the brake's release at a stop and "
+            "bumps: without pedals or torque these cannot be told apart."
         )
     lag = expected_lag(estimate)
     if lag is not None and estimate.observer != "pedals-only":
         said.append(
-            f"The estimate lags: slow changes of the jerk show up about {lag:.2f} s late. That is the price of a smooth "
-            "estimate; a larger ell makes it quicker and noisier, in inverse proportion."
+            f"The estimate lags: slow changes of the jerk show up about {lag:.2f} s late. That is the price of a "
+            "smooth estimate; a larger ell makes it quicker and noisier, in inverse proportion."
         )
     elif lag is not None:
         said.append(
-            f"The jerk is the pedals' filtered derivative, about {lag:.2f} s late. There is no band, for there is no observer to judge "
-            "its own error; the pedals' noise and all that the road does are in it."
+            f"The jerk is the pedals' filtered derivative, about {lag:.2f} s late. There is no band, for there is "
+            "no observer to judge its own error; the pedals' noise and all that the road does are in it."
         )
     if any(o.role == "sd" for o in estimate.outputs):
         said.append(
-            "The band holds the true value 95 % of the time if the model and the vehicle's parameters are right. It "
-            "covers the sensors' noise, not a wrong mass or a wrong coefficient."
+            "The band holds the true value 95% of the time if the model and the vehicle's parameters are right. "
+            "It covers the sensors' noise, not a wrong mass or a wrong coefficient."
         )
     if "acceleration_offset" in estimate:
         said.append(
-            "The road slope is tan(offset / g), the offset being all that the accelerometer shows beyond the change of speed: 1 % is "
-            "0.1 m/s². So it contains the accelerometer's bias and any tilt of its mounting; its changes can be trusted more than its level."
+            "The road slope is tan(offset / g), the offset being all that the accelerometer shows beyond the "
+            "change of speed: 1% is 0.1 m/s². So it contains the accelerometer's bias and any tilt of its "
+            "mounting; its changes can be trusted more than its level."
         )
     if "acceleration_innovation" in estimate:
         said.append(
-            "Innovations are what the estimator did not foresee. They should stay between the dotted lines 95 % of the time and lean to "
-            "neither side; where they do not, something happens that the model does not know."
+            "Innovations are what the estimator did not foresee. They should stay between the dotted lines 95% of "
+            "the time and lean to neither side; where they do not, something happens that the model does not "
+            "know. NIS, in the verdict, is the mean square of these numbers: 1 if the band is right, below 1 if "
+            "it is cautious, above 1.5 if it is too narrow."
         )
     said.append(
-        "Curves are thin and grey where the estimate is not valid. Drag across a plot to zoom, all plots follow; double click for the "
-        "whole drive; drag an axis to move it; click a name in a legend to hide its curve."
+        "Curves are thin and grey, and the plots hatched, where the estimate is not valid. Drag an axis to "
+        "move it; click a name in a legend to hide its curve; the boxes above the plots switch the shadings."
     )
     return said

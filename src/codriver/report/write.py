@@ -47,7 +47,8 @@ def write_report(
         temporary.replace(target)
     except OSError as error:
         raise UsageError(
-            f"the report {target} cannot be written: {error.strerror or error}", "a file in a folder that exists and may be written",
+            f"the report {target} cannot be written: {error.strerror or error}",
+            "a file in a folder that exists and may be written",
             "make the folder, or choose another path",
         ) from error  # fmt: skip
     finally:
