@@ -38,7 +38,7 @@ _CONTAINER_TYPE = 10
 # Padding at most: the next signature starts no later than this behind an object.
 _PADDING = 4
 # Contents parsed at a time, bytes: large enough for numpy to pay, small enough for the cache.
-_BLOCK = 1 << 22
+_BLOCK = 1 << 21
 # No object of a measurement is larger; a size beyond it is damage.
 _LARGEST = 1 << 24
 

@@ -16,8 +16,8 @@ import numpy.typing as npt
 Index = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
 
-# Text parsed at a time, bytes.
-_BLOCK = 1 << 22
+# Text parsed at a time, bytes: little enough that its words stay in the cache.
+_BLOCK = 1 << 19
 _NO_DIGIT = 255
 _HEX = np.full(256, _NO_DIGIT, np.uint8)
 for _characters, _first in ((b"0123456789", 0), (b"abcdef", 10), (b"ABCDEF", 10)):
@@ -86,10 +86,12 @@ class Words:
 
     def begins(self, words: Index, with_: bytes) -> Flags:
         """Which words begin with these characters, in upper or lower case."""
-        same = self.stop[words] - self.start[words] >= len(with_)
+        start = self.start[words]
+        same = self.stop[words] - start >= len(with_)
         for k, character in enumerate(with_):
-            found = self.text[self.start[words] + k]
-            same &= (found | 32) == (character | 32)
+            if not same.any():
+                break
+            same &= (self.text[start + k] | 32) == (character | 32)
         return same
 
     def equals(self, words: Index, text: bytes) -> Flags:
