@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 import codriver as cd
 from codriver.errors import MissingSignal, UsageError
 from codriver.signals import Channel, Sampler
+from codriver.signals.sampler import TOLERANCE
 
 
 @given(
@@ -27,7 +28,7 @@ def test_batch_equals_live(stamps, bad, dt, hold):
     grid = cd.Log.of([signal]).sample([channel], dt, start=0.0, stop=2.0)
     sampler, pushed = Sampler([channel], dt), 0
     for k, tick in enumerate(grid.time):
-        while pushed < time.size and time[pushed] <= tick + 1e-7:
+        while pushed < time.size and time[pushed] <= tick + TOLERANCE:
             sampler.push("x", time[pushed], values[pushed])
             pushed += 1
         row, fresh, held = sampler.row(tick)

@@ -148,10 +148,16 @@ def test_bare_names_find_headers_with_units(tmp_path: Path) -> None:
 
 def test_standard_names_need_no_names_file(tmp_path: Path) -> None:
     path = tmp_path / "drive.csv"
-    path.write_text("time [s],longitudinal_speed [km/h],gear\n0,36,1\n0.1,72,2\n")
+    path.write_text("time [s],longitudinal_speed (km/h),gear,driver_torque [N.m]\n0,36,1,2\n0.1,72,2,2\n")
     log = read(path)
     np.testing.assert_allclose(log["longitudinal_speed"].values, [10, 20])
-    assert set(log) == {"longitudinal_speed", "gear"}
+    assert set(log) == {"longitudinal_speed", "gear", "driver_torque"}
+
+
+def test_stamps_since_1970_are_fresh_on_every_tick(tmp_path: Path) -> None:
+    path = tmp_path / "drive.csv"
+    path.write_text("time,gear\n" + "".join(f"{1_700_000_000.123456 + k / 100:.6f},1\n" for k in range(5000)))
+    assert read(path).sample(["gear"], 0.01).fresh["gear"].all()
 
 
 def test_gzip_whole_and_cut_off(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -102,7 +103,8 @@ def own_names(recording: Recording) -> NamesFile:
     """The mapping of channels that bear standard names themselves: "time,longitudinal_speed,..." or "Message.gear"."""
     entries: dict[str, Entry] = {}
     for name in recording.channels():
-        short = name.rsplit(".", 1)[-1].split("[")[0].strip()
+        # Without the unit of a header or the group of an MDF channel; a unit may hold a point: "[N.m]".
+        short = re.split(r"[\[(@]", name)[0].strip().rsplit(".", 1)[-1]
         if short in VOCABULARY and short not in entries:
             entries[short] = Entry(short, (name,))
     return NamesFile(entries, "the channels' own names")

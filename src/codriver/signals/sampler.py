@@ -22,8 +22,9 @@ from codriver.names import VOCABULARY
 from codriver.signals.grid import Flags, Grid
 from codriver.signals.signal import Array, Signal
 
-# Stamps are written in microseconds at best; a value this much after its tick belongs to it all the same.
-TOLERANCE = 1e-7
+# Stamps are written in microseconds at best, and as seconds since 1970 a double has a grain of 0.24 us; a value this
+# much after its tick belongs to it all the same.
+TOLERANCE = 2e-6
 
 
 @dataclass(frozen=True)
