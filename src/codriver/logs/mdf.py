@@ -66,22 +66,37 @@ class MdfRecording(Recording):
 
     def load(self, names: Iterable[str]) -> dict[str, RawSignal]:
         """The channels named; one that cannot be read is left out and told."""
-        loaded: dict[str, RawSignal] = {}
+        wanted: dict[int, list[str]] = {}
         for name in names:
-            if name not in self._places:
-                continue
-            group, index = self._places[name]
-            try:
-                signal = self._file.select([(None, group, index)], ignore_value2text_conversions=True, validate=True)[0]
+            if name in self._places:
+                wanted.setdefault(self._places[name][0], []).append(name)
+        loaded: dict[str, RawSignal] = {}
+        for members in wanted.values():
+            try:  # a group at once, whose records are then read once
+                signals = self._select(members)
+            except Exception:  # a damaged block shows as any of a dozen errors of the library
+                signals = [signal for name in members for signal in self._select_alone(name)]
+            for name, signal in signals:
                 time, values = np.asarray(signal.timestamps, np.float64), np.asarray(signal.samples)
-            except Exception as error:  # a damaged block shows as any of a dozen errors of the library
-                self._tell(f"channel '{name}' cannot be read ({str(error)[:80]}); left out")
-                continue
-            if values.ndim != 1 or values.dtype.kind not in "uifb" or values.shape != time.shape:
-                self._tell(f"channel '{name}' holds {values.dtype} of shape {values.shape}, no numbers; left out")
-                continue
-            loaded[name] = RawSignal(time, values.astype(np.float64), self._channels[name].unit)
+                if values.ndim != 1 or values.dtype.kind not in "uifb" or values.shape != time.shape:
+                    self._tell(f"channel '{name}' holds {values.dtype} of shape {values.shape}, no numbers; left out")
+                    continue
+                loaded[name] = RawSignal(time, values.astype(np.float64, copy=False), self._channels[name].unit)
         return loaded
+
+    def _select(self, names: list[str]) -> list[tuple[str, Any]]:
+        """The library's signals of these names, invalid samples taken out, enumerations as numbers."""
+        places = [(None, *self._places[name]) for name in names]
+        signals = self._file.select(places, ignore_value2text_conversions=True, validate=True)
+        return list(zip(names, signals, strict=True))
+
+    def _select_alone(self, name: str) -> list[tuple[str, Any]]:
+        """One signal, or none if it cannot be read, which is told."""
+        try:
+            return self._select([name])
+        except Exception as error:
+            self._tell(f"channel '{name}' cannot be read ({str(error)[:80]}); left out")
+            return []
 
     def _free_name(self, name: str, group: str) -> str:
         """The name, or one that says the group too where it is taken."""
