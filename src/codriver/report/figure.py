@@ -130,7 +130,7 @@ def _layout(height: int, start: float, stop: float) -> dict[str, Any]:
             "range": [start, stop], "title": {"text": "time (s)"}, "showgrid": True, "gridcolor": "#e4e4e4",
             "zeroline": False, "side": "bottom", "showspikes": True, "spikemode": "across", "spikesnap": "cursor",
             "spikethickness": 1, "spikecolor": "#777777", "spikedash": "dot", "hoverformat": ".2f", "unifiedhovertitle":
-            {"text": "%{x} s"}, "ticks": "outside", "exponentformat": "none", "separatethousands": False,
+            {"text": "%{x:.2f} s"}, "ticks": "outside", "exponentformat": "none", "separatethousands": False,
         },
     }  # fmt: skip
 
@@ -165,7 +165,8 @@ def _axes(
 def _limits(panel: Panel, right: bool) -> tuple[float, float]:
     """The range of an axis: everything that is drawn where it counts, guides included, and a little more."""
     low, high = (min(panel.guides), max(panel.guides)) if panel.guides and not right else (0.0, 0.0)
-    for item in panel.items:
+    fitted = [i for i in panel.items if isinstance(i, Band) or not i.reference] or panel.items
+    for item in fitted:
         for values in (item.low, item.high) if isinstance(item, Band) else (item.values,):
             if (isinstance(item, Line) and item.right) == right:
                 counted = values[panel.fit & np.isfinite(values)] if panel.fit.any() else values[np.isfinite(values)]

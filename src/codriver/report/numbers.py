@@ -33,7 +33,11 @@ def summary(estimate: Estimate) -> list[Row]:
     rows = [
         Row("duration", clock(n * estimate.grid.dt)),
         Row("distance", _distance(estimate)),
-        Row("valid", f"{valid.mean():.1%}" if n else "–", "share of the duration; all figures below are of this part"),
+        Row(
+            "valid",
+            f"{valid.mean():.1%}" if n else "–",
+            "share of the duration; jerk and acceleration below are of this part",
+        ),
     ]
     for name in (*JERKS, *ACCELERATIONS):
         if name not in estimate:

@@ -43,11 +43,10 @@ def page(estimate: Estimate, title: str | None, truth: Log | None, command: str 
     parts = [
         f"<h1>{text(title)}</h1><p class=lead>{text(what(estimate))}</p>",
         _facts(estimate, rows),
-        tables.verdict(check, origin),
+        tables.verdict(estimate, check, origin),
         _plots(estimate, truth, origin),
         f"<div class=columns><section><h2>Figures</h2>{tables.figures(rows)}</section>"
         f'<section id="how"><h2>How to read this</h2>{reading}</section></div>',
-        f"<h2>What to leave out, and why</h2>{tables.distrust(estimate, origin)}",
     ]
     if truth is not None:
         parts.append(f"<h2>Against the reference</h2>{tables.error_table(errors(estimate, truth), truth.source)}")
@@ -119,7 +118,7 @@ def _key(drawn: Figure, truth: Log | None) -> str:
             f"{text(shade.words)}</label>"
         )
     if truth is not None:
-        labels.append("<span>black, dotted: the reference</span>")
+        labels.append("<span>dotted: the reference, what was true</span>")
     return f"<div class=key>{''.join(labels)}</div>" if labels else ""
 
 

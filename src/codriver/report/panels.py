@@ -40,6 +40,7 @@ class Line:
     steps: bool = False
     right: bool = False  # belongs to the right axis
     legend: bool = True
+    reference: bool = False  # the axis is not fitted to it: true values may be wild where no estimator can follow
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ class _Truth:
             values = on_ticks(self._truth, name, self._time)
             if values is not None:
                 color = PURPLE if dash == "dashdot" else BLACK
-                lines.append(Line(legend, shown(name, values), color, 1.3, dash))
+                lines.append(Line(legend, shown(name, values), color, 1.3, dash, reference=True))
         return lines
 
 

@@ -47,7 +47,7 @@ def words(name: str) -> str:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number for a table: `digits` significant, no exponent in the usual range, an en dash for nothing."""
+    """A number for a table: `digits` significant at most, no exponent in the usual range, a dash for nothing."""
     if not np.isfinite(value):
         return "–"
     if value == 0:
@@ -56,9 +56,7 @@ def number(value: float, digits: int = 3) -> str:
     if not 1e-4 <= size < 1e6:
         written = f"{value:.{digits - 1}e}"
     else:
-        written = f"{value:.{max(digits - 1 - int(np.floor(np.log10(size))), 0)}f}"
-        if size == round(size):
-            written = f"{value:.0f}"
+        written = f"{value:.0f}" if size >= 10**digits else f"{value:.{digits}g}"
     return written.replace("-", "−")
 
 

@@ -82,7 +82,7 @@ def not_valid(estimate: Estimate) -> list[Stretch]:
         missing = [words(name) for name, holes in silent.items() if any(a < stop and b > start for a, b in holes)]
         if missing:
             reasons.append(f"{' and '.join(missing)} missing")
-        elif unknown[inside].any():
+        elif unknown[inside].mean() > 0.02:
             reasons.append("inputs unknown (no value yet, or no gear engaged)")
         if rest[inside].mean() > 0.02 and not missing:
             reasons.append("the estimate has not settled yet")

@@ -11,7 +11,7 @@ from codriver.estimate import Estimate
 from codriver.names import VOCABULARY
 from codriver.report.numbers import Error, Row
 from codriver.report.shown import number, shown, shown_unit, words
-from codriver.report.stretches import Span, Stretch, gaps, not_valid
+from codriver.report.stretches import Span, gaps, not_valid
 from codriver.trust import Check
 
 SEVERITY = {"bad": "Bad", "warn": "Warning", "ok": "Good"}
@@ -40,14 +40,14 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numeric: Sequence[
     return f'<div class="wide"><table>{top}<tbody>{body}</tbody></table></div>'
 
 
-def verdict(check: Check, origin: float) -> str:
-    """The verdict with its findings, the worst first."""
+def verdict(estimate: Estimate, check: Check, origin: float) -> str:
+    """The verdict with its findings, the worst first, and the stretches of time that are not to be trusted."""
     worst = check.findings[0].severity if check.findings else "ok"
     title = {
         "bad": "Do not trust this estimate as it is",
         "warn": "Usable, with care",
         "ok": "Nothing speaks against this estimate",
-    }
+    }[worst]
     items = []
     for finding in check.findings:
         where = ""
@@ -58,31 +58,31 @@ def verdict(check: Check, origin: float) -> str:
             f"<span>{text(_sentence(finding.text))}{where}</span></li>"
         )
     return (
-        f'<section class="verdict {worst}" id="verdict"><h2>{title[worst]}</h2>'
-        f"<p>Verdict: {text(check.verdict)}. {check.valid_share:.1%} of the time is valid.</p>"
-        f"<ul>{''.join(items)}</ul></section>"
+        f'<section class="verdict {worst}" id="verdict"><h2>{title}</h2><p>Verdict: {text(check.verdict)}. '
+        f"{check.valid_share:.1%} of the time is valid.</p><ul class=findings>{''.join(items)}</ul>"
+        f"{_distrust(estimate, origin)}</section>"
     )
 
 
-def distrust(estimate: Estimate, origin: float) -> str:
-    """What not to use and why: silent signals and stretches that are not valid."""
-    items = [
-        f"<li><b>{text(words(name))} missing</b> {_listed(holes, origin)}</li>"
-        for name, holes in gaps(estimate).items()
-    ]
-    by_reason: dict[str, list[Stretch]] = {}
+def _distrust(estimate: Estimate, origin: float) -> str:
+    """What not to use and why: stretches that are not valid, and silent signals."""
+    items = []
+    by_reason: dict[str, list[Span]] = {}
     for stretch in not_valid(estimate):
-        by_reason.setdefault(stretch.reason, []).append(stretch)
-    for reason, stretches in by_reason.items():
-        total = sum(s.span[1] - s.span[0] for s in stretches)
-        items.append(
-            f"<li><b>not valid: {text(reason)}</b>, {total:.1f} s in all: "
-            f"{_listed([s.span for s in stretches], origin)}</li>"
+        by_reason.setdefault(stretch.reason, []).append(stretch.span)
+    for reason, spans in by_reason.items():
+        total = sum(stop - start for start, stop in spans)
+        items.append(f"<li>Leave out {_listed(spans, origin)} ({total:.1f} s in all): not valid, {text(reason)}.</li>")
+    for name, holes in gaps(estimate).items():
+        then = (
+            "the estimate goes on without it, and where it is still valid its band is wider"
+            if name in estimate.measured
+            else "the estimate is not valid there"
         )
+        items.append(f"<li>{text(words(name).capitalize())} missing {_listed(holes, origin)}: {then}.</li>")
     if not items:
-        return "<p>Nothing: every tick is valid and no signal is silent for longer than it may be held.</p>"
-    lead = "Leave these stretches out of any evaluation. A click zooms the plots to a stretch."
-    return f"<p>{lead}</p><ul>{''.join(items)}</ul>"
+        return "<p>No stretch has to be left out: every tick is valid, and no signal is missing.</p>"
+    return f"<p><b>Stretches to distrust</b> (a click zooms the plots to one)</p><ul>{''.join(items)}</ul>"
 
 
 def figures(rows: Iterable[Row]) -> str:
@@ -114,9 +114,9 @@ def error_table(found: Sequence[Error], source: str) -> str:
         for e in found
     ]  # fmt: skip
     return (
-        f"<p>Against the reference “{text(source or 'in memory')}” (dotted in the plots), over the valid ticks. The lag "
-        "is the shift that fits best; an observer always lags, so the error with the lag taken out says how well the "
-        "shape is met.</p>" + table(head, rows, (2, 3, 4, 5, 6))
+        f"<p>Against the reference “{text(source or 'in memory')}” (dotted in the plots), over the valid ticks. The "
+        "lag is the shift that fits best; an observer always lags, so the error with the lag taken out says how well "
+        "the shape is met.</p>" + table(head, rows, (2, 3, 4, 5, 6))
     )  # fmt: skip
 
 

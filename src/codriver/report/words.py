@@ -64,8 +64,8 @@ def how_to_read(estimate: Estimate) -> list[str]:
         said.append(
             "Innovations are what the estimator did not foresee. They should stay between the dotted lines 95% of "
             "the time and lean to neither side; where they do not, something happens that the model does not "
-            "know. NIS, in the verdict, is the mean square of these numbers: 1 if the band is right, below 1 if "
-            "it is cautious, above 1.5 if it is too narrow."
+            "know. The verdict's scatter and lean say how large they are one by one and averaged over 1/ell "
+            "seconds, as multiples of what the band allows: 1 is right, less is cautious, much more is too narrow."
         )
     said.append(
         "Curves are thin and grey, and the plots hatched, where the estimate is not valid. Drag an axis to "
