@@ -137,6 +137,21 @@ def test_cut_off_files_are_told_quietly(tmp_path: Path, capsys: pytest.CaptureFi
     assert "Traceback" not in capsys.readouterr().err
 
 
+def test_damaged_data_are_told(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).normal(size=20_000)
+    path = tmp_path / "drive.mf4"
+    with asammdf.MDF() as file:
+        file.append([signal("v", noise, np.arange(20_000) * 0.01)])
+        file.save(path, overwrite=True, compression=2)
+    content = bytearray(path.read_bytes())
+    middle = len(content) // 2
+    content[middle : middle + 2000] = bytes(2000)
+    path.write_bytes(content)
+    recording = open_recording(path)
+    assert recording.load(["v"]) == {}
+    assert "'v' cannot be read" in recording.faults[0]
+
+
 @needs_canedge
 def test_canedge_needs_a_database() -> None:
     with pytest.raises(errors.LogError, match="45096 frames"):

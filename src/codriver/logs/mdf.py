@@ -95,7 +95,7 @@ class MdfRecording(Recording):
         try:
             return self._select([name])
         except Exception as error:
-            self._tell(f"channel '{name}' cannot be read ({str(error)[:80]}); left out")
+            self._tell(f"channel '{name}' cannot be read, its data are damaged ({type(error).__name__}); left out")
             return []
 
     def _free_name(self, name: str, group: str) -> str:
