@@ -33,7 +33,7 @@ HORIZON = 320  # looked ahead, m
 HOLD = 14e5  # brake pressure at standstill, Pa
 FEEDBACK = 0.45  # k, 1/s
 SEEING = 0.2  # time constant with which speed is perceived, s
-FEELING = 0.8  # time constant with which a new gear is felt, s
+FEELING = 0.6  # time constant with which a new gear is felt, s
 
 
 class Driver:
@@ -134,7 +134,8 @@ class Driver:
             need, goal = (own - v) / 3.0, own
         if stop < HORIZON:
             for_stop = -v * v / (2.0 * max(stop - 1.0 - lost, 1.0))
-            if for_stop < need:
+            # A stop still far off is no reason to crawl.
+            if for_stop < need and (for_stop < -0.5 * style.braking or stop < 40.0):
                 need, goal = for_stop, 0.0
         letting_go = 0.5 * duration_of(now, style.jerk)
         if now < -0.25:

@@ -31,6 +31,7 @@ SLIP = 4.0  # slip over which the friction torque changes sign, rad/s
 STALL = 75.0  # engine speed below which the clutch opens, rad/s
 HAND_BACK = 350.0  # fastest rise of torque handed back after a shift, N m/s
 MINIMUM_STAY = 1.2  # between two shifts, s
+PATIENCE = 4.0  # after a shift, before the pedal can ask for a lower gear, s; else the box would hunt
 # Shift speeds of the engine, rad/s: at released pedal, and their growth with it. A shift up must not land below the
 # speed of the shift down at the same pedal, or the box hunts: UP * tau_next / tau > DOWN.
 UP_BASE, UP_PEDAL = 215.0, 170.0
@@ -124,6 +125,8 @@ class Powertrain:
             self.clutch = min(1.0, self.clutch + dt / 0.06)
             target = v * self._tau[self._next - 1] / p.efficiency + (8.0 if self.direction < 0 else 0.0)
             wanted = max(-60.0, min(130.0, p.engine_inertia * (target - self.speed) / 0.06))
+            if self.clutch < 0.95:  # not yet: the wheels would feel it
+                wanted = 0.0
             if self._elapsed >= 0.5 * p.open_time:
                 self.gear = self._next
             if self._elapsed >= p.open_time:
@@ -165,7 +168,9 @@ class Powertrain:
         steady = not braking and (self._released == 0.0 or self._released > RELEASED)
         if gear < len(taus) and shaft > UP_BASE + UP_PEDAL * pedal and steady:
             self._begin_shift(gear + 1)
-        elif gear > 1 and shaft < DOWN_BASE[gear - 1] + DOWN_PEDAL[gear - 1] * pedal:
+            return
+        asked = pedal if self._since > PATIENCE else 0.0
+        if gear > 1 and shaft < DOWN_BASE[gear - 1] + DOWN_PEDAL[gear - 1] * asked:
             lower = gear - 1
             # When slowing down quickly a gear may be skipped.
             while braking and lower > 1 and v * taus[lower - 1] / eta < DOWN_BASE[lower - 1] + 15.0:

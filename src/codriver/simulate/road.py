@@ -160,7 +160,7 @@ def demo_road() -> Road:
             Zone(980, 70 * KMH),
             Zone(1330, 50 * KMH),
             Zone(1632, 90 * KMH, 1.45),
-            Zone(2230, 50 * KMH, 0.8),
+            Zone(2130, 50 * KMH, 0.8),
         ],
         grades=[
             Grade(380, 90, 0.05),
@@ -170,5 +170,5 @@ def demo_road() -> Road:
             Grade(1700, 120, 0.015),
         ],
         curves=[Curve(860, 930, 55), Curve(1760, 1900, -400)],
-        stops=[Stop(0, 2.5), Stop(1630, 4.0), Stop(2440, 60.0)],
+        stops=[Stop(0, 2.5), Stop(1630, 4.0), Stop(2320, 60.0)],
     )
