@@ -221,7 +221,9 @@ def test_gear_unknown_during_a_shift_keeps_the_intention(car):
     """While the gear reads neutral, u is minus the intention in the old gear; then tau is the new gear's."""
     gear = np.concatenate([np.full(1500, 3.0), np.zeros(50), np.full(1450, 4.0)])
     torque = np.where(gear == 0, 0.0, 16.25)
-    estimate = cd.compile(cd.build("intent-torque", car)).run(drive_log(car, gear=gear, clutch=None, engine_torque=torque))
+    estimate = cd.compile(cd.build("intent-torque", car)).run(
+        drive_log(car, gear=gear, clutch=None, engine_torque=torque)
+    )
     u = estimate.columns["known_input"]
     np.testing.assert_allclose(u[1500:1550], -14 / 1550 * 16.25)
     np.testing.assert_allclose(u[1550:], 0, atol=1e-15)
@@ -308,4 +310,4 @@ def test_brake_coefficient_does_not_matter_in_the_pedal_estimator(car, demo):
 
 def test_prior_scale_is_a_sensors():
     """The prior of the noise scale is an accelerometer of 0.05 m/s^2 rms at 100 Hz, given R = 1."""
-    assert PRIOR_SCALE == pytest.approx(0.05**2 / 100)
+    assert pytest.approx(0.05**2 / 100) == PRIOR_SCALE

@@ -160,5 +160,5 @@ def test_impossible_designs(ell, dt):
 
 
 def test_unknown_preset():
-    with pytest.raises(UsageError, match="bisoffi2015, bisoffi2017|bisoffi2017, bisoffi2015"):
+    with pytest.raises(UsageError, match="one of bisoffi2017, bisoffi2015"):
         design_scaled_gain("bisoffi2016", 0.01)

@@ -49,7 +49,7 @@ _HOME = {
     "Stepper": "program", "compile": "program", "Channel": "signals", "Grid": "signals", "Log": "signals",
     "Sampler": "signals", "Signal": "signals", "Vehicle": "vehicles", "load_vehicle": "vehicles",
 }  # fmt: skip
-__all__ = [*sorted(_HOME), "__version__"]  # noqa: PLE0604
+__all__ = [*sorted(_HOME), "__version__"]
 
 
 def __getattr__(name: str) -> Any:

@@ -85,7 +85,8 @@ class Estimate(Mapping[str, Signal]):
 
     def check(self) -> Check:
         """Whether to trust the estimate: what the innovations and the flags say."""
-        return check_estimate(self.columns, self.grid, self.measured, self.log)
+        horizon = 1.0 / float(self.provenance.get("ell", 2.0))
+        return check_estimate(self.columns, self.grid, self.measured, self.log, horizon)
 
     def _output(self, name: str) -> Output:
         return next(o for o in self.outputs if o.name == name)

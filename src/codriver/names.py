@@ -15,6 +15,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf, pi
 
+from codriver.errors import UsageError
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -43,8 +45,15 @@ class Quantity:
 _ENTRIES = (
     # what the vehicle does
     Quantity("longitudinal_speed", "m/s", "km/h", "v", "speed over ground along x; negative in reverse", -20, 110),
-    Quantity("longitudinal_acceleration", "m/s^2", "m/s^2", "y1",
-             "what an accelerometer along x shows: dv/dt + g sin(slope) + bias; positive when speeding up", -20, 20),
+    Quantity(
+        "longitudinal_acceleration",
+        "m/s^2",
+        "m/s^2",
+        "y1",
+        "what an accelerometer along x shows: dv/dt + g sin(slope) + bias; positive when speeding up",
+        -20,
+        20,
+    ),
     Quantity("longitudinal_jerk", "m/s^3", "m/s^3", "j", "time derivative of the vehicle's acceleration along x"),
     Quantity("lateral_velocity", "m/s", "m/s", "vy", "velocity along y, positive to the left", -30, 30),
     Quantity("lateral_acceleration", "m/s^2", "m/s^2", "ay", "acceleration along y, positive to the left", -30, 30),
@@ -59,15 +68,27 @@ _ENTRIES = (
     Quantity("longitude", "deg", "deg", "lon", "east positive", -180, 180),
     Quantity("altitude", "m", "m", "h", "height above sea level", -500, 9000),
     # what the person does
-    Quantity("accelerator_pedal", "1", "%", "p_r", "accelerator pedal position, 0 released to 1 fully pressed", -0.02, 1.02),
+    Quantity(
+        "accelerator_pedal", "1", "%", "p_r", "accelerator pedal position, 0 released to 1 fully pressed", -0.02, 1.02
+    ),
     Quantity("brake_pressure", "Pa", "bar", "p_b", "brake master-cylinder pressure, gauge", -5e5, 3e7),
     Quantity("brake_switch", "1", "1", "sigma", "1 while the brake pedal is pressed", 0, 1, inf),
     Quantity("steering_wheel_angle", "rad", "deg", "delta_s", "positive to the left", -20, 20),
     Quantity("steering_wheel_rate", "rad/s", "deg/s", "omega_s", "positive to the left", -40, 40),
-    Quantity("steering_wheel_torque", "N*m", "N*m", "T_s", "torque in the steering column, positive to the left", -100, 100),
+    Quantity(
+        "steering_wheel_torque", "N*m", "N*m", "T_s", "torque in the steering column, positive to the left", -100, 100
+    ),
     Quantity("steer_angle", "rad", "deg", "delta", "angle of the steered wheel or fork, positive to the left", -pi, pi),
     Quantity("steer_rate", "rad/s", "deg/s", "omega", "rate of the steered wheel or fork", -40, 40),
-    Quantity("driver_torque", "N*m", "N*m", "T_dr", "torque of the driver's hands on the wheel, positive to the left", -100, 100),
+    Quantity(
+        "driver_torque",
+        "N*m",
+        "N*m",
+        "T_dr",
+        "torque of the driver's hands on the wheel, positive to the left",
+        -100,
+        100,
+    ),
     Quantity("rider_torque", "N*m", "N*m", "T_r", "torque of the rider's hands on the handlebar", -300, 300),
     Quantity("alignment_torque", "N*m", "N*m", "T_aln", "torque of the tyres on the steering column", -300, 300),
     Quantity("front_lateral_force", "N", "N", "Y_f", "lateral force of the front tyres, positive to the left"),
@@ -99,8 +120,6 @@ def quantity(name: str) -> Quantity:
     Raises:
         UsageError: the name is not in the vocabulary; the message names the nearest ones.
     """
-    from codriver.errors import UsageError
-
     try:
         return VOCABULARY[name]
     except KeyError:

@@ -40,7 +40,9 @@ def compile(observer: Observer, outputs: Sequence[str] | None = None) -> Program
     known = [output.name for output in observer.outputs]
     unknown = [name for name in outputs or () if name not in known]
     if unknown:
-        raise UsageError(f"'{observer.name}' has no output {unknown}", f"some of {', '.join(known)}", "correct the name")
+        raise UsageError(
+            f"'{observer.name}' has no output {unknown}", f"some of {', '.join(known)}", "correct the name"
+        )
     recorded = observer.record(None if outputs is None else tuple(outputs))
     return Program(observer, recorded, compile_loop(recorded))
 
@@ -81,7 +83,13 @@ class Program:
         grid = log.sample(self.observer.channels, self.observer.dt, start=start, stop=stop)
         values = self.run_grid(grid)
         return Estimate(
-            self.observer.name, grid, values, self.observer.outputs, self.observer.measured, provenance(self.observer), log
+            self.observer.name,
+            grid,
+            values,
+            self.observer.outputs,
+            self.observer.measured,
+            provenance(self.observer),
+            log,
         )
 
     def run_grid(self, grid: Grid, carry: Mapping[str, float] | None = None) -> dict[str, Array]:
@@ -137,7 +145,9 @@ class Stepper:
         where = [base + 8 * k for k in range(channels)] + [flags + k for k in range(channels)]
         self._given = (ctypes.c_void_p * max(len(where), 1))(*where)
         out = ctypes.addressof(self._out)
-        self._made = (ctypes.c_void_p * max(len(recorded.outputs), 1))(*[out + 8 * k for k in range(len(recorded.outputs))])
+        self._made = (ctypes.c_void_p * max(len(recorded.outputs), 1))(
+            *[out + 8 * k for k in range(len(recorded.outputs))]
+        )
         self._pack = struct.Struct(f"={channels}d{channels}B").pack_into
         self._unpack = struct.Struct(f"={len(recorded.outputs)}d").unpack_from
         self._call = (1, ctypes.addressof(self._carry), ctypes.addressof(self._given), ctypes.addressof(self._made))
@@ -165,7 +175,9 @@ class Stepper:
     def save(self) -> str:
         """The state as JSON text with hexadecimal floats: restored, it continues with the same bits."""
         exact = {name: value.hex() for name, value in self.carry.items()}
-        return json.dumps({"observer": self._program.observer.name, "dt": self._program.observer.dt.hex(), "carry": exact})
+        return json.dumps(
+            {"observer": self._program.observer.name, "dt": self._program.observer.dt.hex(), "carry": exact}
+        )
 
     def restore(self, text: str) -> None:
         """Continue from a saved state.
@@ -180,7 +192,11 @@ class Stepper:
         except (ValueError, KeyError, TypeError, AttributeError):
             raise UsageError("text that is no saved state", "what Stepper.save gave", "save again") from None
         observer = self._program.observer
-        if saved.get("observer") != observer.name or dt != observer.dt or list(carry) != list(self._program.recorded.carry):
+        if (
+            saved.get("observer") != observer.name
+            or dt != observer.dt
+            or list(carry) != list(self._program.recorded.carry)
+        ):
             raise UsageError(
                 f"a state of '{saved.get('observer')}' at dt = {dt:g} s", f"one of '{observer.name}' at dt = {observer.dt:g} s",
                 "restore it into a stepper of the same design",

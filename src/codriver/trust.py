@@ -4,9 +4,10 @@ A filter whose assumptions hold leaves innovations that are as large as it says 
 looked at, where the estimate is valid:
 
 * share of time that is valid at all;
-* normalised innovation squared (NIS) of each row, mean of e^2 / var(e): 1 when the band is right. Above 1.5 the band is too
-  narrow for that sensor;
-* stretches where the NIS of 1 s is above 16 for a row: wheel slip, a wrong ratio, a sensor fault;
+* scatter of each row, the mean of e^2 / var(e) (the normalised innovation squared, NIS), and lean, the same of block means
+  over 1/ell seconds: how much the innovations do together. The band is set so that the larger is about 1 over the drive;
+  above 2.25 (1.5 times the band) it is too narrow for that sensor;
+* stretches where one of the two is above 16 for at least 1 s: wheel slip, a wrong ratio, a sensor fault;
 * the sensors against each other: accelerometer and change of speed must go together, else a sign or a unit is wrong;
 * the accelerometer offset: more than 3 m/s^2 is no road.
 """
@@ -22,7 +23,7 @@ import numpy.typing as npt
 from codriver.signals import Grid, Log
 from codriver.signals.signal import Array
 
-WIDE, BAD_STRETCH, STEEP = 1.5, 16.0, 3.0
+WIDE, BAD_STRETCH, STEEP = 2.25, 16.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -48,11 +49,13 @@ class Check:
         findings: what was looked at, the worst first.
         valid_share: share of the ticks that are valid.
         nis: mean normalised innovation squared of each row, by row.
+        lean: mean normalised square of the rows' block means, by row.
     """
 
     findings: tuple[Finding, ...]
     valid_share: float
     nis: Mapping[str, float]
+    lean: Mapping[str, float]
 
     @property
     def trusted(self) -> bool:
@@ -69,7 +72,9 @@ class Check:
         return f"usable, with {warn} warning{'s' * (warn > 1)}" if warn else "nothing speaks against it"
 
 
-def check_estimate(values: Mapping[str, Array], grid: Grid, measured: tuple[str, ...], log: Log) -> Check:
+def check_estimate(
+    values: Mapping[str, Array], grid: Grid, measured: tuple[str, ...], log: Log, horizon: float = 0.5
+) -> Check:
     """Look at an estimate; see the module's docstring.
 
     Args:
@@ -77,13 +82,15 @@ def check_estimate(values: Mapping[str, Array], grid: Grid, measured: tuple[str,
         grid: its sampled inputs.
         measured: names of the measurements.
         log: where it came from; its faults become warnings.
+        horizon: of the lean, s: 1/ell.
     """
     valid = values["valid"] > 0.5 if "valid" in values else np.ones(len(grid), bool)
     findings = [_validity(values, valid, grid)]
     nis: dict[str, float] = {}
+    lean: dict[str, float] = {}
     for row in ("acceleration", "speed"):
         if f"{row}_innovation" in values:
-            findings += _row(row, values, valid, grid, nis)
+            findings += _row(row, values, valid, grid, horizon, nis, lean)
     if {"longitudinal_acceleration", "longitudinal_speed"} <= set(measured):
         findings += _sensors_agree(log)
     if "acceleration_offset" in values and valid.any():
@@ -95,7 +102,9 @@ def check_estimate(values: Mapping[str, Array], grid: Grid, measured: tuple[str,
             ))  # fmt: skip
     findings += [Finding("warn", fault) for fault in log.faults]
     order = {"bad": 0, "warn": 1, "ok": 2}
-    return Check(tuple(sorted(findings, key=lambda f: order[f.severity])), float(valid.mean()) if valid.size else 0.0, nis)
+    return Check(
+        tuple(sorted(findings, key=lambda f: order[f.severity])), float(valid.mean()) if valid.size else 0.0, nis, lean
+    )
 
 
 def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid) -> Finding:
@@ -111,34 +120,41 @@ def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: G
 
 
 def _row(
-    row: str, values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid, nis: dict[str, float]
-) -> list[Finding]:
+    row: str, values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid, horizon: float,
+    nis: dict[str, float], lean: dict[str, float],
+) -> list[Finding]:  # fmt: skip
     """What the innovations of one measured row say."""
     used = valid & (values.get(f"{row}_used", np.ones(len(grid))) > 0.5)
     if used.sum() < 50:
         return [Finding("warn", f"{row}: only {int(used.sum())} valid innovations, too few to judge the band")]
-    ratio = np.where(used, (values[f"{row}_innovation"] / values[f"{row}_innovation_sd"]) ** 2, 0.0)
-    mean = float(ratio[used].mean())
-    nis[row] = mean
-    findings = []
-    if mean > WIDE:
+    normal = np.where(used, values[f"{row}_innovation"] / values[f"{row}_innovation_sd"], 0.0)
+    nis[row] = float(np.mean(normal[used] ** 2))
+    together, weight = _blocks(normal, used, max(round(horizon / grid.dt), 1))
+    lean[row] = float(np.average(together, weights=weight)) if weight.any() else 0.0
+    said = f"{row}: the innovations scatter {nis[row] ** 0.5:.2g} and lean {lean[row] ** 0.5:.2g} times what the band allows"
+    findings = [
+        Finding("bad", f"{said}; the band is too narrow: check vehicle parameters and units, or raise ell")
+        if max(nis[row], lean[row]) > WIDE
+        else Finding("ok", f"{said} (1 is right, less is cautious)")
+    ]
+    second = max(round(1.0 / grid.dt), 1)
+    leaning, count = _blocks(normal, used, second)
+    scattering = np.add.reduceat(normal**2, np.arange(0, normal.size, second)) / np.maximum(count, 1)
+    worst = np.maximum(leaning, scattering)
+    bad = np.repeat((worst > BAD_STRETCH) & (count >= 5), second)[: len(grid)] & valid
+    if bad.any():
         findings.append(Finding(
-            "bad", f"{row}: the innovations are {mean**0.5:.1f} times as wide as the band says (NIS {mean:.2f}); "
-            "the band is too narrow: check vehicle parameters and units, or lower ell",
-        ))  # fmt: skip
-    else:
-        findings.append(Finding("ok", f"{row}: NIS {mean:.2f} (1 is right, below 1 the band is cautious)"))
-    window = max(int(round(1.0 / grid.dt)), 1)
-    kernel = np.ones(window)
-    count = np.convolve(used, kernel, "same")
-    local = np.convolve(ratio, kernel, "same") / np.maximum(count, 1)
-    stretch = (local > BAD_STRETCH) & (count >= 5) & valid
-    if stretch.any():
-        findings.append(Finding(
-            "warn", f"{row}: {stretch.sum() * grid.dt:.1f} s where the innovations are {np.sqrt(local[stretch].max()):.0f} times "
-            "their band: slip, a wrong ratio, or a sensor fault", _spans(stretch, grid),
+            "warn", f"{row}: {bad.sum() * grid.dt:.1f} s where the innovations are up to {worst.max() ** 0.5:.0f} times "
+            "their band: slip, a wrong ratio, or a sensor fault", _spans(bad, grid),
         ))  # fmt: skip
     return findings
+
+
+def _blocks(normal: Array, used: npt.NDArray[np.bool_], length: int) -> tuple[Array, Array]:
+    """Of blocks of `length` ticks: the square of the summed innovations per innovation (1 if white), and how many there are."""
+    starts = np.arange(0, normal.size, length)
+    count = np.add.reduceat(used.astype(float), starts)
+    return np.add.reduceat(normal, starts) ** 2 / np.maximum(count, 1), count
 
 
 def _sensors_agree(log: Log) -> list[Finding]:

@@ -5,6 +5,7 @@ Exit codes: 0 done, 1 the data does not allow it, 2 misuse, 130 interrupted.
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Annotated
 
@@ -61,4 +62,13 @@ def main() -> None:
         raise SystemExit(1) from None
     except OSError as error:
         typer.echo(f"codriver: {error.strerror or error}: {error.filename or ''}", err=True)
+        raise SystemExit(1) from None
+    except Exception as error:
+        if os.environ.get("CODRIVER_DEBUG"):
+            raise
+        typer.echo(
+            f"codriver: this should not have happened: {type(error).__name__}: {error}\n"
+            "  nothing was written; set CODRIVER_DEBUG=1 to see where, and please report it with the log's format",
+            err=True,
+        )
         raise SystemExit(1) from None

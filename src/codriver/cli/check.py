@@ -8,7 +8,9 @@ from typing import Annotated
 import typer
 
 app = typer.Typer(help="Check a vehicle file or a names file.", no_args_is_help=True)
-File = Annotated[str, typer.Argument(metavar="FILE", help="A TOML file (for vehicles, a built-in name too).", show_default=False)]
+File = Annotated[
+    str, typer.Argument(metavar="FILE", help="A TOML file (for vehicles, a built-in name too).", show_default=False)
+]
 
 
 @app.command("vehicle")
@@ -34,11 +36,16 @@ def vehicle(file: File) -> None:
     out.print()
     for estimator in ESTIMATORS.values():
         lacking = [p for p in estimator.parameters if p not in car]
-        out.print(f"  {'[red]no[/] ' if lacking else '[green]yes[/]'} {estimator.name:<14}" + (f" lacks {', '.join(lacking)}" if lacking else ""))
+        out.print(
+            f"  {'[red]no[/] ' if lacking else '[green]yes[/]'} {estimator.name:<14}"
+            + (f" lacks {', '.join(lacking)}" if lacking else "")
+        )
 
 
 @app.command("names")
-def names(file: Annotated[Path, typer.Argument(metavar="FILE", help="A names file (TOML).", show_default=False)]) -> None:
+def names(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A names file (TOML).", show_default=False)],
+) -> None:
     """Check a names file; show what it maps."""
     from rich.markup import escape
     from rich.table import Table

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from codriver.estimate import Estimate
+    from codriver.signals import Log
 
 
 def demo(
@@ -40,26 +46,35 @@ def demo(
     estimate = estimate_log(
         "intent", files.log, result, "bisoffi2017", files.dbc, files.names, report=report, truth=truth
     )
-    _compare(estimate, files.truth, screen)
+    _compare(estimate, truth, screen)
 
 
-def _compare(estimate: object, truth: Path, screen: object) -> None:
+def _compare(estimate: Estimate, truth: Log, screen: Console) -> None:
     """How far the estimate is from the truth."""
     from rich.table import Table
 
     from codriver.simulate.judge import judge
 
-    rows = judge(estimate, truth)  # type: ignore[arg-type]
+    rows = judge(estimate, truth)
     table = Table(box=None, pad_edge=False)
-    for column in ("against the simulated truth, where valid", "rms error", "unit", "answering 0", "kinematic", "in the 95 % band"):
-        table.add_column(column, justify="left" if column in ("against the simulated truth, where valid", "unit") else "right")
+    for column in (
+        "against the simulated truth, where valid",
+        "rms error",
+        "unit",
+        "answering 0",
+        "kinematic",
+        "in the 95 % band",
+    ):
+        table.add_column(
+            column, justify="left" if column in ("against the simulated truth, where valid", "unit") else "right"
+        )
     for row in rows:
         numbers = [f"{x:.3f}" if x is not None else "-" for x in (row.error, row.zero, row.kinematic)]
         coverage = f"{row.coverage:.0%}" if row.coverage is not None else "-"
         table.add_row(row.what, numbers[0], row.unit, numbers[1], numbers[2], coverage)
-    screen.print()  # type: ignore[attr-defined]
-    screen.print(table)  # type: ignore[attr-defined]
-    screen.print(  # type: ignore[attr-defined]
+    screen.print()
+    screen.print(table)
+    screen.print(
         "\n'lag taken out' compares with the same observer fed ideal signals of the truth: what remains is noise, holes in the\n"
         "data and model error. Against the truth of the moment the observer's lag dominates (docs/trust.md)."
     )

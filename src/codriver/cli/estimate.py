@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 def estimate(
     estimator: EstimatorName,
     log: LogPath,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT", help="Result: .parquet, .csv or .mf4.", show_default=False)],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="OUT", help="Result: .parquet, .csv or .mf4.", show_default=False)
+    ],
     vehicle: VehicleName = None,
     dbc: Dbc = None,
     names: Names = None,
@@ -131,7 +133,9 @@ def _write(result: Estimate, out: Path, report: Path | None, command: str, truth
     # The report goes first, to a name of its own; it is renamed when the result is there too.
     draft = report.with_name(f".{report.name}.draft")
     try:
-        write_report(result, draft, truth=truth, command=command, title=f"{result.observer}: {Path(result.log.source).name}")
+        write_report(
+            result, draft, truth=truth, command=command, title=f"{result.observer}: {Path(result.log.source).name}"
+        )
         save_estimate(result, out, {"command": command})
         draft.replace(report)
     finally:

@@ -32,7 +32,9 @@ def export_c_files(
     from codriver.vehicles import load_vehicle
 
     if estimator == "intent":
-        raise UsageError("'intent' stands for whatever a log can feed", "one estimator", "name it, such as intent-pedals")
+        raise UsageError(
+            "'intent' stands for whatever a log can feed", "one estimator", "name it, such as intent-pedals"
+        )
     car = load_vehicle(vehicle) if vehicle is not None else None
     observer = build(estimator, car, dt=dt, ell=ell, preset=preset, form=form)
     files = export_c(compile(observer), out, real)

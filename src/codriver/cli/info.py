@@ -77,7 +77,15 @@ def _show(summary: dict[str, Any]) -> None:
     if summary["signals"]:
         table = Table(box=None, pad_edge=False)
         for column in ("signal", "unit", "samples", "rate Hz", "minimum", "maximum", "missing", "source"):
-            table.add_column(column, justify="left" if column in ("signal", "unit", "source") else "right", no_wrap=True)
+            left = column in ("signal", "unit", "source")
+            # On a narrow terminal the source folds; numbers are never cut.
+            table.add_column(
+                column,
+                justify="left" if left else "right",
+                no_wrap=column != "source",
+                overflow="fold",
+                min_width=len(column),
+            )
         for s in summary["signals"]:
             numbers = [f"{s[key]:.4g}" if s[key] is not None else "-" for key in ("rate_hz", "minimum", "maximum")]
             table.add_row(s["name"], s["unit"], str(s["samples"]), *numbers, str(s["missing"]), escape(s["source"]))
@@ -97,7 +105,9 @@ def _show(summary: dict[str, Any]) -> None:
         lacks = [f"signals: {', '.join(e['missing_signals'])}"] if e["missing_signals"] else []
         if e["missing_parameters"]:
             given = summary["vehicle"] is not None
-            lacks.append(f"vehicle parameters: {', '.join(e['missing_parameters'])}" if given else "a vehicle (--vehicle)")
+            lacks.append(
+                f"vehicle parameters: {', '.join(e['missing_parameters'])}" if given else "a vehicle (--vehicle)"
+            )
         mark = "[yellow]part[/]" if e["signals_there"] else "[red]no[/]  "
         out.print(f"  {mark} {e['name']:<14} lacks {'; '.join(lacks)}")
     if summary["best"]:
@@ -108,4 +118,6 @@ def _show(summary: dict[str, Any]) -> None:
     elif summary["best_with_a_vehicle"]:
         out.print(f"\nbest available with a vehicle file: [bold]{summary['best_with_a_vehicle']}[/]")
     else:
-        out.print("\nno estimator can be fed: kinematic, the least, needs longitudinal_acceleration and longitudinal_speed")
+        out.print(
+            "\nno estimator can be fed: kinematic, the least, needs longitudinal_acceleration and longitudinal_speed"
+        )

@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-LogPath = Annotated[Path, typer.Argument(metavar="LOG", help="A recording: file, or folder of a known layout.", show_default=False)]
+LogPath = Annotated[
+    Path, typer.Argument(metavar="LOG", help="A recording: file, or folder of a known layout.", show_default=False)
+]
 Dbc = Annotated[Path | None, typer.Option("--dbc", help="CAN database, for raw CAN traces.", show_default=False)]
 Names = Annotated[
     Path | None, typer.Option("--names", help="Names file (TOML): channels to standard names.", show_default=False)
@@ -15,12 +17,16 @@ Names = Annotated[
 Bus = Annotated[int | None, typer.Option("--bus", help="CAN channel to keep; all by default.", show_default=False)]
 VehicleName = Annotated[
     str | None,
-    typer.Option("--vehicle", help="Built-in name (bisoffi2017, bisoffi2015, renault-zoe) or TOML file.", show_default=False),
+    typer.Option(
+        "--vehicle", help="Built-in name (bisoffi2017, bisoffi2015, renault-zoe) or TOML file.", show_default=False
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Write the summary as JSON to standard output, and nothing else.")]
 Ell = Annotated[
     float | None,
-    typer.Option("--ell", help="The knob: larger is quicker and noisier. Default: the preset's (2).", show_default=False),
+    typer.Option(
+        "--ell", help="The knob: larger is quicker and noisier. Default: the preset's (2).", show_default=False
+    ),
 ]
 PresetName = Annotated[str, typer.Option("--preset", help="Noise of a paper: bisoffi2017 or bisoffi2015.")]
 Form = Annotated[str, typer.Option("--form", help="kalman (missing rows exact) or constant (the papers' gain; small).")]

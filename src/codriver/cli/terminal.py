@@ -6,7 +6,10 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 _STYLE = {"ok": "green", "warn": "yellow", "bad": "red"}
 
@@ -31,11 +34,12 @@ def working(show: bool) -> Iterator[Callable[[str], None]]:
         yield lambda text: progress.update(task, description=text)
 
 
-def console() -> Any:
-    """Standard output; as wide as it needs where it is no terminal, so that nothing is cut."""
+def console() -> Console:
+    """Standard output; where it is no terminal, wide enough that tables are not cut, and text is not wrapped."""
     from rich.console import Console
 
-    return Console(highlight=False, soft_wrap=not sys.stdout.isatty())
+    piped = not sys.stdout.isatty()
+    return Console(highlight=False, soft_wrap=piped, width=160 if piped else None)
 
 
 def say(summary: dict[str, Any]) -> None:
@@ -46,12 +50,20 @@ def say(summary: dict[str, Any]) -> None:
     out = console()
     settings = summary["settings"]
     parts = [f"{key} {settings[key]}" for key in ("vehicle", "ell", "preset", "form") if key in settings]
-    out.print(f"[bold]{summary['estimator']}[/] on {escape(summary['log'])}" + (f": {', '.join(parts)}" if parts else ""))
+    out.print(
+        f"[bold]{summary['estimator']}[/] on {escape(summary['log'])}" + (f": {', '.join(parts)}" if parts else "")
+    )
     if summary["why"]:
         out.print(f"chosen as {escape(summary['why'])}")
     distance = f", {summary['distance_m'] / 1000:.2f} km" if summary["distance_m"] is not None else ""
-    extra = f", {summary['gear_shifts']} gear shifts, braking {summary['braking_share']:.0%}" if summary["gear_shifts"] else ""
-    out.print(f"{summary['duration_s']:.1f} s{distance} at {summary['rate_hz']:g} Hz, valid {summary['valid_share']:.0%}{extra}\n")
+    extra = (
+        f", {summary['gear_shifts']} gear shifts, braking {summary['braking_share']:.0%}"
+        if summary["gear_shifts"]
+        else ""
+    )
+    out.print(
+        f"{summary['duration_s']:.1f} s{distance} at {summary['rate_hz']:g} Hz, valid {summary['valid_share']:.0%}{extra}\n"
+    )
     table = Table(box=None, pad_edge=False)
     for column in ("estimate", "unit", "rms", "5 %", "95 %", "mean sd"):
         table.add_column(column, justify="left" if column in ("estimate", "unit") else "right")
@@ -62,4 +74,6 @@ def say(summary: dict[str, Any]) -> None:
     out.print(f"\n[bold]verdict[/]: {summary['verdict']}")
     for finding in summary["findings"]:
         out.print(f"  [{_STYLE[finding['severity']]}]{finding['severity']:<4}[/] {escape(finding['text'])}")
-    out.print(f"\nwrote {escape(summary['result'])}" + (f" and {escape(summary['report'])}" if summary["report"] else ""))
+    out.print(
+        f"\nwrote {escape(summary['result'])}" + (f" and {escape(summary['report'])}" if summary["report"] else "")
+    )

@@ -68,7 +68,9 @@ def export_c(program: Program, folder: str | Path, real: str = "double") -> list
             for file in files:
                 shutil.move(str(Path(scratch) / file), folder / file)
     except OSError as error:
-        raise UsageError(f"cannot write {folder}: {error}", "a folder that can be written", "choose another -o") from None
+        raise UsageError(
+            f"cannot write {folder}: {error}", "a folder that can be written", "choose another -o"
+        ) from None
     return [folder / file for file in files]
 
 
@@ -151,4 +153,9 @@ def _golden_text(program: Program) -> dict[str, str]:
     finite = np.all([np.isfinite(results[n]).all() for n in recorded.outputs])
     assert finite, "golden outputs must be finite"
     names = ", ".join(f'"{n}"' for n in recorded.outputs)
-    return {"inputs": "\n".join(rows_in), "outputs": "\n".join(rows_out), "names": names, "width": str(len(recorded.outputs))}
+    return {
+        "inputs": "\n".join(rows_in),
+        "outputs": "\n".join(rows_out),
+        "names": names,
+        "width": str(len(recorded.outputs)),
+    }

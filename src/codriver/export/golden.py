@@ -36,7 +36,9 @@ def golden_inputs(program: Program, rows: int = ROWS, seed: int = 7) -> Grid:
         elif name == "longitudinal_acceleration":
             column = np.gradient(speed, observer.dt * 10) + 0.2 + 0.1 * rng.standard_normal(rows)
         elif name == "gear":
-            column = np.repeat(rng.choice([0, 1, 2, 3, 4, 5, -1], rows // 20 + 1, p=[0.1, 0.2, 0.2, 0.2, 0.15, 0.1, 0.05]), 20)[:rows]
+            column = np.repeat(
+                rng.choice([0, 1, 2, 3, 4, 5, -1], rows // 20 + 1, p=[0.1, 0.2, 0.2, 0.2, 0.15, 0.1, 0.05]), 20
+            )[:rows]
         elif entry is not None and entry.hold == inf:  # switches and the clutch
             column = np.repeat(rng.choice([0.0, 0.0, 0.0, 0.5, 1.0], rows // 10 + 1), 10)[:rows]
         else:
@@ -47,4 +49,4 @@ def golden_inputs(program: Program, rows: int = ROWS, seed: int = 7) -> Grid:
         values[name] = column.astype(np.float32).astype(np.float64)
         fresh[name] = rng.random(rows) < 0.7
         held[name] = (rng.random(rows) < 0.97) & (np.arange(rows) > 3)
-    return Grid(observer.dt * np.arange(rows), observer.dt, values, fresh, held)
+    return Grid(observer.dt * np.arange(rows, dtype=np.float64), observer.dt, values, fresh, held)

@@ -98,7 +98,9 @@ def readme(observer: Observer, name: str, real: str, operations: int, tolerance:
     measured = ", ".join(observer.measured) or "none"
     held = ", ".join(observer.inputs)
     promise = (
-        "bit for bit those of codriver" if real == "double" else f"within {tolerance:g} of codriver's, relative to max(1, |value|)"
+        "bit for bit those of codriver"
+        if real == "double"
+        else f"within {tolerance:g} of codriver's, relative to max(1, |value|)"
     )
     return f"""# {observer.name} in C99
 

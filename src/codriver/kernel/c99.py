@@ -13,7 +13,18 @@ from dataclasses import dataclass
 from codriver.kernel.record import Recorded
 
 _BOOLEAN = ("lt", "le", "eq", "ne", "not", "and", "or")
-_SIGN = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "ne": "!=", "and": "&&", "or": "||"}
+_SIGN = {
+    "add": "+",
+    "sub": "-",
+    "mul": "*",
+    "div": "/",
+    "lt": "<",
+    "le": "<=",
+    "eq": "==",
+    "ne": "!=",
+    "and": "&&",
+    "or": "||",
+}
 _LONGEST = 90  # characters an expression may grow to before it gets a name
 
 

@@ -200,7 +200,9 @@ def _drop_unused(
     return kept, {key: place[number] for key, number in targets.items()}
 
 
-def interpret(recorded: Recorded, carry: Mapping[str, float], inputs: Mapping[str, float]) -> tuple[list[float], list[float]]:
+def interpret(
+    recorded: Recorded, carry: Mapping[str, float], inputs: Mapping[str, float]
+) -> tuple[list[float], list[float]]:
     """One step by CasADi's own interpreter: the referee of the printers."""
     new, out = recorded.function([carry[key] for key in recorded.carry], [inputs[key] for key in recorded.inputs])
     return [float(x) for x in new.full().ravel()], [float(x) for x in out.full().ravel()]

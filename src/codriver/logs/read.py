@@ -62,7 +62,9 @@ def read(
 
 def read_recording(recording: Recording, names: str | Path | NamesFile | None = None) -> Log:
     """The Log of an opened recording; see `read`."""
-    mapping = names if isinstance(names, NamesFile) else load_names(names) if names is not None else recording.default_names
+    mapping = (
+        names if isinstance(names, NamesFile) else load_names(names) if names is not None else recording.default_names
+    )
     channels = recording.channels()
     if mapping is None:
         mapping = own_names(recording)
@@ -82,7 +84,8 @@ def read_recording(recording: Recording, names: str | Path | NamesFile | None = 
         if absent:
             near = nearest(absent[0], channels)
             faults.append(
-                f"{entry.name}: the recording has no channel '{absent[0]}'" + (f"; did the names file mean {near}?" if near else "")
+                f"{entry.name}: the recording has no channel '{absent[0]}'"
+                + (f"; did the names file mean {near}?" if near else "")
             )
             continue
         signals.append(_standard(entry, [raw[source] for source in entry.source], faults))
@@ -131,7 +134,11 @@ def _standard(entry: Entry, parts: list[RawSignal], faults: list[str]) -> Signal
             values = values + other
         else:  # held onto the first part's clock
             index = np.searchsorted(other_time, time, side="right") - 1
-            values = values + np.where(index >= 0, other[np.maximum(index, 0)], np.nan) if other.size else values + np.nan
-    signal = Signal(entry.name, time, values / len(mended) if len(mended) > 1 else values, target, " + ".join(entry.source))
+            values = (
+                values + np.where(index >= 0, other[np.maximum(index, 0)], np.nan) if other.size else values + np.nan
+            )
+    signal = Signal(
+        entry.name, time, values / len(mended) if len(mended) > 1 else values, target, " + ".join(entry.source)
+    )
     faults.extend(find_faults(signal))
     return signal

@@ -28,7 +28,9 @@ class ReadOptions:
 class ReaderFunction(Protocol):
     """A reader: path and options in, recording out. Raises LogError."""
 
-    def __call__(self, path: Path, options: ReadOptions) -> Recording: ...
+    def __call__(self, path: Path, options: ReadOptions) -> Recording:
+        """Open a recording."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,9 @@ def predict_covariance(P: Matrix, F: Array, Q: Array) -> Matrix:
     """
     n = len(P)
     FP = [[_dot([(F[i, k], P[k][j]) for k in range(n)]) for j in range(n)] for i in range(n)]
-    return symmetric([[_dot([(F[j, k], FP[i][k]) for k in range(n)]) + _number(Q[i, j]) for j in range(n)] for i in range(n)])
+    return symmetric(
+        [[_dot([(F[j, k], FP[i][k]) for k in range(n)]) + _number(Q[i, j]) for j in range(n)] for i in range(n)]
+    )
 
 
 def update_row(

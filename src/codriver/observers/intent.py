@@ -143,7 +143,9 @@ def build(
         front, outputs = known_input.kinematic(dt), MOTION
     else:
         assert vehicle is not None
-        front = known_input.from_pedals(vehicle, dt) if name == "intent-pedals" else known_input.from_torque(vehicle, dt)
+        front = (
+            known_input.from_pedals(vehicle, dt) if name == "intent-pedals" else known_input.from_torque(vehicle, dt)
+        )
         outputs = INTENTION
     observer = chain(front, jerk_observer(design, form, outputs), name)
     settings = {"estimator": name, **observer.settings, "preset": label}

@@ -63,7 +63,10 @@ def jerk_observer(design: ScaledGain, form: str, outputs: tuple[Output, ...], na
         known = select(standing, 0.0, known)
         x, P = _predict(carry, design, known, kalman)
         first = both(started, negate(carry["started"]))
-        x = [select(first, value, old) for value, old in zip([y_v, 0.0, select(ok_a, y_a - known, 0.0), 0.0], x, strict=True)]
+        x = [
+            select(first, value, old)
+            for value, old in zip([y_v, 0.0, select(ok_a, y_a - known, 0.0), 0.0], x, strict=True)
+        ]
         if kalman:
             wide = [[WIDE_START * P_stationary[i, j] if i == j else 0.0 for j in range(4)] for i in range(4)]
             P = [[select(first, wide[i][j], P[i][j]) for j in range(4)] for i in range(4)]
@@ -85,10 +88,8 @@ def jerk_observer(design: ScaledGain, form: str, outputs: tuple[Output, ...], na
             P = _forget_motion(P, standing, P_stationary)
 
         moving = both(started, negate(standing))
-        scale_in = {key: carry[key] for key in noise_scale.initial()}
-        scale_new, scale = noise_scale.learn(
-            scale_in, (("acceleration", e_a, s_a, use_a), ("speed", e_v, s_v, use_v)), moving, design.dt, 1.0 / design.ell
-        )
+        innovations = {"acceleration": (e_a, s_a, use_a), "speed": (e_v, s_v, use_v)}
+        scale_new, scale = noise_scale.learn(carry, innovations, moving, design.dt, 1.0 / design.ell)
         v_size = select(x[0] < 0, -x[0], x[0])
         since = select(started, carry["since_start"] + design.dt, 0.0)
         variances = [P[i][i] if kalman else float(P_stationary[i, i]) for i in range(4)]
@@ -164,7 +165,9 @@ def _more_outputs(outputs: tuple[Output, ...], rows: tuple[str, str]) -> tuple[O
         output
         for row in rows
         for output in (
-            Output(f"{row}_innovation", units[row], "innovation", f"measured {row} less predicted; 0 where none arrived"),
+            Output(
+                f"{row}_innovation", units[row], "innovation", f"measured {row} less predicted; 0 where none arrived"
+            ),
             Output(f"{row}_innovation_sd", units[row], "innovation_sd", f"standard deviation of {row}_innovation"),
         )
     )

@@ -56,7 +56,13 @@ def kinematic(dt: float) -> Observer:
 
 
 def _front(
-    name: str, vehicle: Vehicle, dt: float, M: float, required: tuple[str, ...], optional: tuple[str, ...], intended: object
+    name: str,
+    vehicle: Vehicle,
+    dt: float,
+    M: float,
+    required: tuple[str, ...],
+    optional: tuple[str, ...],
+    intended: object,
 ) -> Observer:
     """The step that all known inputs share; `intended` gives the driver's torque, brake force, and whether both are known."""
 

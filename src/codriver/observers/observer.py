@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from codriver.errors import DesignError
 from codriver.kernel import Recorded, Scalar, record
@@ -54,8 +55,8 @@ class Certificate:
 
     holds: bool
     claims: tuple[str, ...]
-    eigenvalues: Array
-    discrete_eigenvalues: Array
+    eigenvalues: npt.NDArray[np.complex128]
+    discrete_eigenvalues: npt.NDArray[np.complex128]
     decay_rate: float
 
 
@@ -160,6 +161,6 @@ def chain(first: Observer, second: Observer, name: str | None = None) -> Observe
     )  # fmt: skip
 
 
-def stable(eigenvalues: Array) -> bool:
+def stable(eigenvalues: npt.NDArray[np.complex128]) -> bool:
     """Whether all eigenvalues of a discrete step lie inside the unit circle."""
     return bool(np.all(np.abs(eigenvalues) < 1))

@@ -76,9 +76,7 @@ def powertrain(vehicle: Vehicle, dt: float, carry: Scalars, u: Scalars, ok: Scal
 
     sigma = _sigma(vehicle, carry["sigma_before"], u, ok)
     new = {"tau": tau, "gear_before": gear, "since_shift": since, "sigma_before": sigma}
-    return Powertrain(
-        tau, passing, select(gear < 0, -1.0, 1.0), sigma, shifting, negate(tau == 0), new
-    )
+    return Powertrain(tau, passing, select(gear < 0, -1.0, 1.0), sigma, shifting, negate(tau == 0), new)
 
 
 def _gear(ratios: tuple[float, ...], u: Scalars, ok: Scalars) -> Scalar:

@@ -116,8 +116,8 @@ def design_scaled_gain(preset: Preset | str, dt: float, ell: float | None = None
 def _certify(A: Array, C: Array, F: Array, L_K: Array, L: Array, K: Array, ell: float, dt: float) -> Certificate:
     """What the gains themselves show: stability, scaling, and how near the step's poles are to the paper's."""
     base = np.sort_complex(np.linalg.eigvals(A - L_K @ C))
-    scaled = np.sort_complex(np.linalg.eigvals(A - L @ C))
-    discrete = np.linalg.eigvals((np.eye(4) - K @ C) @ F)
+    scaled = np.sort_complex(np.linalg.eigvals(A - L @ C)).astype(complex)
+    discrete = np.linalg.eigvals((np.eye(4) - K @ C) @ F).astype(complex)
     wanted = np.exp(scaled * dt)
     # Relative to how fast each pole is; matched by nearness, since complex pairs may come in another order.
     pole_error = max(float(np.min(np.abs(discrete - w)) / abs(1 - w)) for w in wanted)

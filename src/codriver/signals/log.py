@@ -76,9 +76,13 @@ class Log(Mapping[str, Signal]):
 
     def between(self, start: float, stop: float) -> Log:
         """The part of every signal with start <= time < stop."""
-        return Log({n: s.between(start, stop) for n, s in self.signals.items()}, self.source, self.faults, self.unmapped)
+        return Log(
+            {n: s.between(start, stop) for n, s in self.signals.items()}, self.source, self.faults, self.unmapped
+        )
 
-    def sample(self, channels: Iterable[str | Channel], dt: float, *, start: float | None = None, stop: float | None = None) -> Grid:
+    def sample(
+        self, channels: Iterable[str | Channel], dt: float, *, start: float | None = None, stop: float | None = None
+    ) -> Grid:
         """The signals on a common tick by causal hold; see `codriver.signals.sampler` for the definition.
 
         Channels that the log lacks are columns of NaN whose flags are all False.

@@ -72,7 +72,7 @@ def sample(
             "at most 2^31 ticks",
             "check the stamps of the log (mixed clocks?), or choose a longer tick",
         )
-    time = first + dt * np.arange(count)
+    time: Array = first + dt * np.arange(count, dtype=np.float64)
     values: dict[str, Array] = {}
     fresh: dict[str, Flags] = {}
     held: dict[str, Flags] = {}

@@ -36,7 +36,9 @@ class Signal:
             array.flags.writeable = False
             object.__setattr__(self, field, array)
         if self.time.shape != self.values.shape or self.time.ndim != 1:
-            raise ValueError(f"{self.name}: time {self.time.shape} and values {self.values.shape} must be equal vectors")
+            raise ValueError(
+                f"{self.name}: time {self.time.shape} and values {self.values.shape} must be equal vectors"
+            )
 
     def __len__(self) -> int:
         return self.time.size

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from codriver.estimate import Estimate
 from codriver.observers import build, design_scaled_gain
@@ -62,7 +63,9 @@ def judge(estimate: Estimate, truth: Log) -> list[Judgement]:
         ("intentional_acceleration", "m/s^2", "intentional acceleration, the moment's"),
         ("intentional_jerk", "m/s^3", "intentional jerk, the moment's"),
     ):
-        rows.append(_row(estimate, other, name, unit, label, at(truth, name, estimate.time), rivals[name], valid, banded=True))
+        rows.append(
+            _row(estimate, other, name, unit, label, at(truth, name, estimate.time), rivals[name], valid, banded=True)
+        )
     for of, label in (("model", "intentional jerk, lag taken out"), ("plan", "driver's planned jerk, lag taken out")):
         wanted = "intentional_acceleration" if of == "model" else "planned_acceleration"
         reference = delay_matched(truth, wanted, dt, ell, preset, settings["form"])
@@ -71,7 +74,9 @@ def judge(estimate: Estimate, truth: Log) -> list[Judgement]:
             _row(estimate, other, "intentional_jerk", "m/s^3", label, lagged, "longitudinal_jerk", valid, banded=False)
         )
     offset = at(truth, "acceleration_offset", estimate.time)
-    rows.append(_row(estimate, None, "acceleration_offset", "m/s^2", "accelerometer offset", offset, "", valid, banded=True))
+    rows.append(
+        _row(estimate, None, "acceleration_offset", "m/s^2", "accelerometer offset", offset, "", valid, banded=True)
+    )
     return rows
 
 
@@ -101,7 +106,7 @@ def at(log: Log, name: str, time: Array) -> Array:
 
 def _row(
     estimate: Estimate, other: Estimate | None, name: str, unit: str, label: str, truth: Array, rival: str,
-    valid: Array, *, banded: bool,
+    valid: npt.NDArray[np.bool_], *, banded: bool,
 ) -> Judgement:  # fmt: skip
     error = estimate.columns[name] - truth
     sd = estimate.sd(name) if banded else None

@@ -42,13 +42,17 @@ class Known:
 
 KNOWN: dict[str, Known] = {
     "mass": Known("kg", 50, 60000, False, "M, total mass as driven"),
-    "transmission": Known("1/m", 0.1, 500, True, "tau, wheel force per engine torque, one value per forward gear (2017 eq. 1b)"),
+    "transmission": Known(
+        "1/m", 0.1, 500, True, "tau, wheel force per engine torque, one value per forward gear (2017 eq. 1b)"
+    ),
     "transmission_reverse": Known("1/m", 0.1, 500, False, "tau of the reverse gear, as a positive number"),
     "brake_coefficient": Known("N/Pa", 1e-5, 1, False, "c_b, brake force per brake pressure (2017 eq. 8a)"),
     "pedal_coefficient": Known("N*m", 1, 5000, False, "c_r, torque request at the fully pressed pedal (2017 eq. 8b)"),
     "rolling_resistance": Known("N", 0, 20000, False, "kappa_1 = C_r M g (2017 eq. 19)"),
     "drag": Known("kg/m", 0, 20, False, "kappa_2 = rho S C_x / 2 (2017 eq. 19)"),
-    "brake_threshold": Known("Pa", 0, 2e6, False, "brake pressure above which the driver is braking (sigma of 2017 eq. 4)"),
+    "brake_threshold": Known(
+        "Pa", 0, 2e6, False, "brake pressure above which the driver is braking (sigma of 2017 eq. 4)"
+    ),
 }
 _HEAD = ("name", "title", "source")
 _FIELDS = ("value", "unit", "sd", "source")
@@ -136,7 +140,9 @@ def _parameter(name: str, table: Any, faults: list[str]) -> Parameter | None:
         return None
     for number in value if isinstance(value, tuple) else (value,):
         if not known.low <= number <= known.high:
-            faults.append(f"[{name}] value {number:g} {known.unit} is outside {known.low:g} to {known.high:g} {known.unit}")
+            faults.append(
+                f"[{name}] value {number:g} {known.unit} is outside {known.low:g} to {known.high:g} {known.unit}"
+            )
             return None
     if "sd" in table and (sd is None or min(sd if isinstance(sd, tuple) else (sd,)) < 0):
         faults.append(f"[{name}] sd must be a number that is not negative (or one per gear)")

@@ -53,7 +53,9 @@ class Vehicle:
         value = self._get(name).value
         if isinstance(value, tuple):
             raise VehicleError(
-                f"vehicle '{self.name}': parameter '{name}' has {len(value)} values", "one number", "see docs/vehicles.md"
+                f"vehicle '{self.name}': parameter '{name}' has {len(value)} values",
+                "one number",
+                "see docs/vehicles.md",
             )
         return value
 
