@@ -14,7 +14,7 @@ import numpy as np
 from codriver.estimate import Estimate
 from codriver.report.pack import Pack
 from codriver.report.panels import Band, Line, Panel
-from codriver.report.stretches import Span, spans
+from codriver.report.stretches import Span, braking, spans
 
 TITLE, TOP, BOTTOM, LEFT, RIGHT = 34, 26, 46, 64, 58  # pixels
 
@@ -113,7 +113,7 @@ def figure(estimate: Estimate, stack: list[Panel], origin: float = 0.0) -> Figur
 
 
 def _stretches(estimate: Estimate, origin: float) -> dict[str, list[Span]]:
-    masks = {key: estimate.flag(key) for key in ("braking", "gear_shift")} | {"not_valid": ~estimate.valid}
+    masks = {"braking": braking(estimate), "gear_shift": estimate.flag("gear_shift"), "not_valid": ~estimate.valid}
     return {
         key: [(round(a - origin, 4), round(b - origin, 4)) for a, b in spans(mask, estimate)]
         for key, mask in masks.items()

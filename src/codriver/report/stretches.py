@@ -37,6 +37,18 @@ def _span(run: tuple[int, int], estimate: Estimate) -> Span:
     return float(estimate.time[run[0]]), float(estimate.time[run[1] - 1] + estimate.grid.dt)
 
 
+def braking(estimate: Estimate) -> npt.NDArray[np.bool_]:
+    """Where the driver brakes: as the estimator found, or as the log's brake switch says where the estimator does not."""
+    if "braking" in estimate or "brake_switch" not in estimate.log or not len(estimate.grid):
+        return estimate.flag("braking")
+    grid = estimate.grid
+    on = estimate.log.sample(["brake_switch"], grid.dt, start=float(grid.time[0]), stop=float(grid.time[-1]))
+    pressed = np.zeros(len(grid), bool)
+    n = min(len(on), len(grid))
+    pressed[:n] = (on.values["brake_switch"] > 0.5)[:n]
+    return pressed
+
+
 def gaps(estimate: Estimate) -> dict[str, list[Span]]:
     """Where the signals the estimator takes are silent for longer than they may be held, by name.
 

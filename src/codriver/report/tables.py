@@ -52,7 +52,7 @@ def verdict(estimate: Estimate, check: Check, origin: float) -> str:
     for finding in check.findings:
         where = ""
         if finding.spans and finding.severity != "ok":
-            where = f" <span class=where>At {_listed(finding.spans, origin)}.</span>"
+            where = f" <span class=where>(at {_listed(finding.spans, origin)})</span>"
         items.append(
             f'<li class="{finding.severity}"><b class=tag>{SEVERITY[finding.severity]}</b> '
             f"<span>{text(_sentence(finding.text))}{where}</span></li>"
