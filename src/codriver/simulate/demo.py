@@ -52,7 +52,7 @@ class DemoFiles:
 
 
 def demo_drive(seed: int = 1) -> DemoDrive:
-    """Simulate the demo drive; takes about a second and a half."""
+    """Simulate the demo drive; takes about two seconds."""
     trace = drive(demo_road(), DURATION, seed=seed)
     sensors = SensorParameters()
     frames = transmit(Instruments(trace, sensors, seed), DURATION, BusParameters(holes=(HOLE,)), seed=seed)
