@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from codriver.signals.signal import Array
 
-MOST = 60_000  # points kept of a column
+MOST = 120_000  # points kept of a column
 _MISSING = -(2**31)  # stands for NaN
 
 

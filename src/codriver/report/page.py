@@ -96,9 +96,10 @@ def _plots(estimate: Estimate, truth: Log | None, origin: float) -> str:
         notes.append(f"Time 0 s is {origin:.3f} s of the recording's clock.")
     spec = json.dumps(drawn.spec, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     return (
-        f"<h2>Plots</h2>{_HINT}{_key(drawn, truth)}{''.join(f'<p><small>{text(n)}</small></p>' for n in notes)}\n"
+        f"<section class=plots><h2>Plots</h2>{_HINT}{_key(drawn, truth)}"
+        f"{''.join(f'<p><small>{text(n)}</small></p>' for n in notes)}\n"
         '<div id="plots"></div>'
-        "<noscript><p>The plots need JavaScript; all figures in the tables stand without.</p></noscript>\n"
+        "<noscript><p>The plots need JavaScript; all figures in the tables stand without.</p></noscript></section>\n"
         f'<script type="application/json" id="figure">{spec}</script>\n'
         f'<script type="application/octet-stream" id="columns">{drawn.data}</script>\n'
         f'<script type="application/octet-stream" id="plotly">{_plotly()}</script>\n'

@@ -152,8 +152,8 @@
         Plotly.relayout(plot, { ...structuredClone(home), "xaxis.range": [Math.max(a - room, spec.span[0]), Math.min(b + room, spec.span[1])] });
         plot.scrollIntoView({ behavior: "smooth" });
       });
-    // On paper the plots take the width of the sheet.
-    window.addEventListener("beforeprint", () => Plotly.relayout(plot, { width: 700 }));
+    // On paper page.css shrinks the plots by 0.61, so that this width fills a sheet.
+    window.addEventListener("beforeprint", () => Plotly.relayout(plot, { width: 1120 }));
     window.addEventListener("afterprint", () => Plotly.relayout(plot, { width: null, autosize: true }));
     document.body.dataset.drawn = "yes";
   }
