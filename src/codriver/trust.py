@@ -6,7 +6,8 @@ looked at, where the estimate is valid:
 * share of time that is valid at all;
 * scatter of each row, the mean of e^2 / var(e) (the normalised innovation squared, NIS), and lean, the same of block means
   over 1/ell seconds: how much the innovations do together. The band is set so that the larger is about 1 over the drive;
-  above 2.25 (1.5 times the band) it is too narrow for that sensor;
+  above 2.25 (1.5 times the band) is a
+  warning, above 6.25 (2.5 times) the band is wrong;
 * stretches where one of the two is above 16 for at least 1 s: wheel slip, a wrong ratio, a sensor fault;
 * the sensors against each other: accelerometer and change of speed must go together, else a sign or a unit is wrong;
 * the accelerometer offset: more than 3 m/s^2 is no road.
@@ -23,7 +24,7 @@ import numpy.typing as npt
 from codriver.signals import Grid, Log
 from codriver.signals.signal import Array
 
-WIDE, BAD_STRETCH, STEEP = 2.25, 16.0, 3.0
+WIDE, WRONG, BAD_STRETCH, STEEP = 2.25, 6.25, 16.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -132,11 +133,12 @@ def _row(
     together, weight = _blocks(normal, used, max(round(horizon / grid.dt), 1))
     lean[row] = float(np.average(together, weights=weight)) if weight.any() else 0.0
     said = f"{row}: the innovations scatter {nis[row] ** 0.5:.2g} and lean {lean[row] ** 0.5:.2g} times what the band allows"
-    findings = [
-        Finding("bad", f"{said}; the band is too narrow: check vehicle parameters and units, or raise ell")
-        if max(nis[row], lean[row]) > WIDE
-        else Finding("ok", f"{said} (1 is right, less is cautious)")
-    ]
+    larger = max(nis[row], lean[row])
+    if larger > WIDE:
+        severity = "bad" if larger > WRONG else "warn"
+        findings = [Finding(severity, f"{said}; it is too narrow: check vehicle parameters and units, or raise ell")]
+    else:
+        findings = [Finding("ok", f"{said} (1 is right, less is cautious)")]
     second = max(round(1.0 / grid.dt), 1)
     leaning, count = _blocks(normal, used, second)
     scattering = np.add.reduceat(normal**2, np.arange(0, normal.size, second)) / np.maximum(count, 1)

@@ -15,7 +15,7 @@ from math import exp, pi
 
 from codriver.kernel import Scalar, both, negate, select
 from codriver.observers.observer import Observer, Output, Scalars
-from codriver.observers.powertrain import CARRY, FLAGS, powertrain
+from codriver.observers.powertrain import CARRY, FLAGS, PEDAL_PRESSED, powertrain
 from codriver.vehicles import Vehicle
 
 CORNER_FREQUENCY = 2.0  # Hz, 2017 section IV-C
@@ -44,7 +44,7 @@ def pedals_only(vehicle: Vehicle, dt: float) -> Observer:
             "intentional_acceleration": select(known, select(train.sigma, -brake * pressure, gas * pedal), 0.0),
             "intentional_jerk": select(known, select(train.sigma, -brake * rates[1], gas * rates[0]), 0.0),
             "direction": train.direction, "inputs_known": known, "braking": train.sigma, "gear_shift": train.shifting,
-            "both_pedals": both(train.sigma, pedal > 0.02), "valid": known,
+            "both_pedals": both(train.sigma, pedal > PEDAL_PRESSED), "valid": known,
         }  # fmt: skip
         return new, out
 

@@ -19,6 +19,7 @@ from codriver.vehicles import Vehicle
 DEFAULT_BRAKE_THRESHOLD = 0.7e5  # Pa; above the rest pressure and noise of the sensors we have seen
 SHIFT_SECONDS = 0.5
 OPEN_CLUTCH = 0.05
+PEDAL_PRESSED = 0.02
 
 CARRY = {"tau": 0.0, "gear_before": 0.0, "since_shift": SHIFT_SECONDS, "sigma_before": 0.0}
 FLAGS = (
