@@ -148,7 +148,7 @@ class Stepper:
         self._made = (ctypes.c_void_p * max(len(recorded.outputs), 1))(
             *[out + 8 * k for k in range(len(recorded.outputs))]
         )
-        self._pack = struct.Struct(f"={channels}d{channels}B").pack_into
+        self._pack = struct.Struct(f"={channels}d{channels}?").pack_into
         self._unpack = struct.Struct(f"={len(recorded.outputs)}d").unpack_from
         self._call = (1, ctypes.addressof(self._carry), ctypes.addressof(self._given), ctypes.addressof(self._made))
 

@@ -84,7 +84,8 @@ class _Printer:
                 continue
             value = _bare(self._real(k))
             # The old state is read until the last expression is printed, so new values wait in constants.
-            simple = value.replace("_", "").isalnum() and not value[0].isdigit()
+            plain = value.removeprefix("(real)")
+            simple = plain.replace("_", "").isalnum() and not plain[0].isdigit()
             if simple:
                 results.append(f"s->{name} = {value};")
             else:

@@ -1,0 +1,132 @@
+"""Programs, steppers and estimates."""
+
+import numpy as np
+import pytest
+
+import codriver as cd
+from codriver.errors import DesignError, MissingSignal, UsageError
+from codriver.observers import Observer, Output
+from codriver.program import Stepper
+from codriver.signals import Channel, Sampler
+from conftest import constant, motion_log
+
+
+def test_five_lines(demo_files):
+    """The README's five lines."""
+    log = cd.read(demo_files.log, dbc=demo_files.dbc, names=demo_files.names)
+    vehicle = cd.load_vehicle("bisoffi2017")
+    observer = cd.build("intent-pedals", vehicle, dt=0.01, ell=2)
+    program = cd.compile(observer)
+    estimate = program.run(log)
+    assert {"intentional_jerk", "intentional_jerk_sd", "valid"} <= set(estimate)
+    assert estimate.check().trusted
+    assert estimate.provenance["vehicle"] == "bisoffi2017"
+
+
+def test_live_bus_equals_batch(car, demo):
+    """Values pushed one by one into a Sampler, ticks stepped live: the bits of the batch."""
+    program = cd.compile(cd.build("intent-pedals", car))
+    log = demo.measured.between(0, 20)
+    estimate = program.run(log)
+    sampler = Sampler([Channel.named(c) for c in program.observer.channels], program.observer.dt)
+    values = sorted(
+        (t, name, v) for name in program.observer.channels if name in log
+        for t, v in zip(log[name].time, log[name].values, strict=True)
+    )  # fmt: skip
+    stepper, at = program.live(), 0
+    for k, tick in enumerate(estimate.time):
+        while at < len(values) and values[at][0] <= tick + 2e-6:
+            sampler.push(values[at][1], values[at][0], values[at][2])
+            at += 1
+        row, fresh, held = sampler.row(tick)
+        ok = [(fresh if c in program.observer.measured else held)[c] for c in program.observer.channels]
+        out = stepper([*[row[c] for c in program.observer.channels], *ok])
+        assert out == tuple(estimate.columns[name][k] for name in stepper.outputs)
+
+
+def test_saved_state_continues_with_the_same_bits(car):
+    program = cd.compile(cd.build("kinematic", dt=0.01))
+    log, _ = motion_log(10)
+    rows = [
+        {"longitudinal_acceleration": a, "longitudinal_speed": v}
+        for a, v in zip(log["longitudinal_acceleration"].values, log["longitudinal_speed"].values, strict=True)
+    ]
+    whole = program.live()
+    answers = [whole.step(row) for row in rows]
+    first = program.live()
+    for row in rows[:500]:
+        first.step(row)
+    second = cd.compile(cd.build("kinematic", dt=0.01)).live()
+    second.restore(first.save())
+    assert [second.step(row) for row in rows[500:]] == answers[500:]
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"dt": "0x1p-3", "carry": {}}', "null"])
+def test_wrong_state_is_refused(text):
+    stepper = cd.compile(cd.build("kinematic")).live()
+    with pytest.raises(UsageError):
+        stepper.restore(text)
+
+
+def test_state_of_another_design_is_refused():
+    other = cd.compile(cd.build("kinematic", dt=0.02)).live().save()
+    with pytest.raises(UsageError, match=r"dt = 0.02 s"):
+        cd.compile(cd.build("kinematic", dt=0.01)).live().restore(other)
+
+
+def test_missing_signal_says_what_is_missing(car):
+    log, _ = motion_log(10)
+    with pytest.raises(MissingSignal, match="lacks accelerator_pedal, brake_pressure, engine_torque, gear"):
+        cd.compile(cd.build("intent-pedals", car)).run(log)
+
+
+def test_unknown_names():
+    observer = cd.build("kinematic")
+    with pytest.raises(UsageError, match="no output"):
+        cd.compile(observer, ["jerk"])
+    with pytest.raises(UsageError, match="did you mean 'kinematic'"):
+        cd.build("kinematics")
+    with pytest.raises(UsageError, match="'kalman' or 'constant'"):
+        cd.build("kinematic", form="kalmann")
+    log, _ = motion_log(2)
+    with pytest.raises(MissingSignal, match="no output 'jerk'"):
+        cd.compile(observer).run(log)["jerk"]
+
+
+def adder(name: str, reads: str, writes: str, dt: float = 0.01, carry: str = "s") -> Observer:
+    """y = u + 1, with a count carried."""
+
+    def step(c, u, y, ok, rho):
+        return {carry: c[carry] + 1.0}, {writes: u[reads] + 1.0}
+
+    return Observer(name, dt, (reads,), (), {carry: 0.0}, (Output(writes, "1", "estimate"),), step)
+
+
+def test_chain_is_an_observer():
+    """Outputs feed inputs of the same name; three in a row; the carry holds all."""
+    three = cd.chain(cd.chain(adder("a", "x", "p"), adder("b", "p", "q", carry="t")), adder("c", "q", "r", carry="w"))
+    assert three.channels == ("x",)
+    out = cd.compile(three).live().step({"x": 1.0})
+    assert out == {"p": 2.0, "q": 3.0, "r": 4.0}
+    with pytest.raises(DesignError, match="both carry"):
+        cd.chain(adder("a", "x", "p"), adder("b", "p", "q"))
+    with pytest.raises(DesignError, match="ticks"):
+        cd.chain(adder("a", "x", "p"), adder("b", "p", "q", dt=0.02, carry="t"))
+
+
+def test_empty_and_tiny_logs():
+    """Three samples give three rows, none of them valid; no crash."""
+    t = np.array([0.0, 0.01, 0.02])
+    log = cd.Log.of([constant("longitudinal_speed", 5, t), constant("longitudinal_acceleration", 0, t)])
+    estimate = cd.compile(cd.build("kinematic")).run(log)
+    assert len(estimate.grid) == 3
+    assert not estimate.valid.any()
+    assert not estimate.check().trusted
+
+
+def test_stepper_is_quick_to_call():
+    """The row form does not build a mapping: its arguments are the recorded inputs, in order."""
+    stepper = cd.compile(cd.build("kinematic")).live()
+    assert isinstance(stepper, Stepper)
+    assert stepper.inputs[:3] == ("gear", "longitudinal_acceleration", "longitudinal_speed")
+    assert len(stepper([1.0, 0.0, 5.0, 1, 1, 1])) == len(stepper.outputs)
