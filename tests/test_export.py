@@ -59,8 +59,8 @@ def test_the_check_can_fail(exported, tmp_path):
     folder = shutil.copytree(exported / "kinematic-kalman-double", tmp_path / "c")
     source = folder / "kinematic.c"
     text = source.read_text()
-    assert "0.005 *" in text
-    source.write_text(text.replace("0.005 *", "0.0050000000000000010 *", 1))
+    assert "0.01 * s->x_acceleration" in text
+    source.write_text(text.replace("0.01 * s->x_acceleration", "0.010000000000000002 * s->x_acceleration"))
     subprocess.run(["gcc", *STRICT, source, folder / "kinematic_check.c", "-o", tmp_path / "check", "-lm"], check=True)
     ran = subprocess.run([tmp_path / "check"], capture_output=True, text=True)
     assert ran.returncode == 1

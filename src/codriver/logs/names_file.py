@@ -1,11 +1,11 @@
 """Names files: TOML that maps a source's channels to standard names.
 
-    [longitudinal_speed]
-    source = "Wheels.FrontLeft"       # or a list, whose mean is taken: ["Wheels.RearLeft", "Wheels.RearRight"]
-    unit = "km/h"                     # overrides what the source says; needed where it says nothing
-    scale = 1.01                      # optional: value * scale + offset, in the source's unit, before the unit is converted
-    offset = 0.0
-    sign = -1                         # optional: -1 turns the direction
+[longitudinal_speed]
+source = "Wheels.FrontLeft"       # or a list, whose mean is taken: ["Wheels.RearLeft", "Wheels.RearRight"]
+unit = "km/h"                     # overrides what the source says; needed where it says nothing
+scale = 1.01                      # optional: value * scale + offset, in the source's unit, before the unit is converted
+offset = 0.0
+sign = -1                         # optional: -1 turns the direction
 """
 
 from __future__ import annotations
@@ -121,4 +121,6 @@ def _entry(name: str, table: Any, faults: list[str]) -> Entry | None:
             faults.append(f"[{name}] {error.found} (expected {error.expected})")
     if len(faults) > before:
         return None
-    return Entry(name, sources, unit, float(table.get("scale", 1.0)), float(table.get("offset", 0.0)), int(table.get("sign", 1)))
+    return Entry(
+        name, sources, unit, float(table.get("scale", 1.0)), float(table.get("offset", 0.0)), int(table.get("sign", 1))
+    )
