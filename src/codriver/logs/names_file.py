@@ -43,6 +43,19 @@ class Entry:
     offset: float = 0.0
     sign: int = 1
 
+    def conversion(self, unit: str) -> tuple[float, float]:
+        """Gain and shift that take a value of the source to the standard unit: standard = gain * value + shift.
+
+        Args:
+            unit: what the source says; used where the entry gives none.
+
+        Raises:
+            UnitError: the unit is unknown, or of another kind.
+        """
+        target = VOCABULARY[self.name].unit
+        factor, offset = to_si(self.unit if self.unit is not None else unit or target, target)
+        return self.scale * factor * self.sign, self.offset * factor * self.sign + offset
+
 
 @dataclass(frozen=True)
 class NamesFile:

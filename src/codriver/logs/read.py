@@ -14,7 +14,6 @@ from codriver.logs.recording import RawSignal, Recording
 from codriver.logs.registry import ReadOptions, find_reader
 from codriver.names import VOCABULARY, nearest
 from codriver.signals import Log, Signal
-from codriver.units import to_si
 
 
 def open_recording(path: str | Path, *, dbc: str | Path | None = None, bus: int | None = None) -> Recording:
@@ -120,14 +119,11 @@ def _standard(entry: Entry, parts: list[RawSignal], faults: list[str]) -> Signal
     for source, part in zip(entry.source, parts, strict=True):
         time, values, notes = mend_clock(np.asarray(part.time, float), np.asarray(part.values, float))
         faults.extend(f"{entry.name} ({source}): {note}" for note in notes)
-        unit = entry.unit if entry.unit is not None else part.unit or target
         try:
-            factor, offset = to_si(unit, target)
+            gain, shift = entry.conversion(part.unit)
         except UnitError as error:
             raise UnitError(f"{entry.name} ({source}): {error.found}", error.expected, error.do) from None
-        scale = factor * entry.sign
-        same = scale == 1.0 and entry.scale == 1.0 and entry.offset == 0.0 and offset == 0.0
-        mended.append((time, values if same else (values * entry.scale + entry.offset) * scale + offset))
+        mended.append((time, values if (gain, shift) == (1.0, 0.0) else gain * values + shift))
     time, values = mended[0]
     for other_time, other in mended[1:]:
         if other_time.shape == time.shape and np.array_equal(other_time, time):
