@@ -45,7 +45,9 @@ def test_golden_vectors(name, form, real, target, exported, tmp_path):
         pytest.skip("this machine has no FMA")
     folder, stem = exported / f"{name}-{form}-{real}", name.replace("-", "_")
     sources = [str(folder / f"{stem}.c"), str(folder / f"{stem}_check.c")]
-    built = subprocess.run([*compiler, *STRICT, *sources, "-o", tmp_path / "check", "-lm"], capture_output=True, text=True)
+    built = subprocess.run(
+        [*compiler, *STRICT, *sources, "-o", tmp_path / "check", "-lm"], capture_output=True, text=True
+    )
     assert built.returncode == 0, built.stderr
     ran = subprocess.run([*runner, str(tmp_path / "check")], capture_output=True, text=True)
     assert ran.returncode == 0, ran.stdout

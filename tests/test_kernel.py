@@ -47,7 +47,9 @@ def run_machine(recorded, carry, a, b, flag):
 
 
 RECORDED = record("everything", everything, ["s"], ["a", "b", "flag"], ["flag"])
-numbers = st.one_of(st.floats(allow_nan=True, allow_infinity=True, allow_subnormal=False), st.sampled_from([0.0, -0.0, 1.0]))
+numbers = st.one_of(
+    st.floats(allow_nan=True, allow_infinity=True, allow_subnormal=False), st.sampled_from([0.0, -0.0, 1.0])
+)
 
 
 def bits(values):

@@ -199,7 +199,7 @@ class Stepper:
         ):
             raise UsageError(
                 f"a state of '{saved.get('observer')}' at dt = {dt:g} s", f"one of '{observer.name}' at dt = {observer.dt:g} s",
-                "restore it into a stepper of the same design",
+                "restore it into a stepper of the same design and outputs",
             )  # fmt: skip
         self._carry[: len(carry)] = list(carry.values())
 

@@ -88,6 +88,9 @@ def record(
         inputs: names of the inputs.
         flags: those of the inputs that are 0 or 1.
 
+    Returns:
+        the step; carried scalars that no output depends on are left out.
+
     Raises:
         KernelError: the step returns another carry than it takes, or uses an operation the kernel does not carry.
     """
@@ -105,13 +108,32 @@ def record(
             f"the carry it takes, in its order: {list(carry)}",
             "return every carried scalar, in order",
         )
-    results = ca.vertcat(*[ca.SX(new[key]) for key in carry]), ca.vertcat(*[ca.SX(value) for value in out.values()])
-    function = ca.Function(name, [state, given], ca.cse(list(results)), ["carry", "input"], ["carry_next", "output"])
+    kept = _needed(state, list(new.values()), list(out.values()))
+    results = ca.vertcat(*[ca.SX(list(new.values())[k]) for k in kept]), ca.vertcat(*[ca.SX(v) for v in out.values()])
+    taken = ca.vertcat(ca.SX(0, 1), *[state[k] for k in kept])
+    function = ca.Function(name, [taken, given], ca.cse(list(results)), ["carry", "input"], ["carry_next", "output"])
     instructions, targets = _drop_unused(*_fuse_selects(*_assign_once(name, function)))
     return Recorded(
-        name, tuple(carry), tuple(inputs), frozenset(flags), tuple(out), tuple(instructions),
-        tuple(targets[0, k] for k in range(len(carry))), tuple(targets[1, k] for k in range(len(out))), function,
+        name, tuple(carry[k] for k in kept), tuple(inputs), frozenset(flags), tuple(out), tuple(instructions),
+        tuple(targets[0, k] for k in range(len(kept))), tuple(targets[1, k] for k in range(len(out))), function,
     )  # fmt: skip
+
+
+def _needed(state: Any, new: Sequence[Scalar], out: Sequence[Scalar]) -> list[int]:
+    """The carried scalars that some output depends on, now or later; what feeds only itself is not computed."""
+    import casadi as ca
+
+    place = {state[k].element_hash(): k for k in range(len(new))}
+
+    def read_by(value: Scalar) -> set[int]:
+        return {place[s.element_hash()] for s in ca.symvar(ca.SX(value)) if s.element_hash() in place}
+
+    needed: set[int] = set()
+    fresh = set().union(*(read_by(value) for value in out))
+    while fresh:
+        needed |= fresh
+        fresh = set().union(*(read_by(new[k]) for k in fresh)) - needed
+    return sorted(needed)
 
 
 def _assign_once(name: str, function: Any) -> tuple[list[Instruction], dict[tuple[int, int], int]]:

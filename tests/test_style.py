@@ -1,0 +1,47 @@
+"""Linter, formatter, types and import rules are tests like any other."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from conftest import ROOT
+
+BIN = Path(sys.executable).parent
+CHECKS = {
+    "ruff check": [BIN / "ruff", "check", "."],
+    "ruff format": [BIN / "ruff", "format", "--check", "."],
+    "mypy": [BIN / "mypy"],
+    "import-linter": [BIN / "lint-imports"],
+}
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_style(name):
+    command = CHECKS[name]
+    if not command[0].exists():
+        pytest.skip(f"{command[0].name} is not installed")
+    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+
+
+def test_import_is_light():
+    """`import codriver` loads numpy at most: no CasADi, scipy, plotly or CAN library."""
+    program = (
+        "import sys, codriver; heavy = {'casadi', 'scipy', 'plotly', 'can', 'cantools', 'asammdf', 'pyarrow', 'pandas', "
+        "'llvmlite', 'pint', 'typer', 'rich'}; print(sorted(heavy & set(sys.modules)))"
+    )
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"
+
+
+def test_help_is_light():
+    """`codriver --help` loads no number-crunching library at all."""
+    program = (
+        "import sys; sys.argv = ['codriver', '--help']\nfrom codriver.cli import main\ntry: main()\nexcept SystemExit: pass\n"
+        "heavy = {'casadi', 'scipy', 'plotly', 'can', 'cantools', 'asammdf', 'pyarrow', 'pandas', 'llvmlite', 'pint', 'numpy'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip().splitlines()[-1] == "[]"
