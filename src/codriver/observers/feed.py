@@ -34,6 +34,11 @@ class Feed:
         """Whether log and vehicle together feed it."""
         return not self.missing and not self.lacking
 
+    def lacks(self, vehicle: Vehicle | None) -> str:
+        """What stands in its way, for people."""
+        wants = [f"[{p}] of the vehicle" for p in self.lacking] if vehicle is not None else []
+        return ", ".join([*self.missing, *wants, *(["a vehicle"] if self.lacking and vehicle is None else [])])
+
 
 def feeds(signals: Collection[str], vehicle: Vehicle | None) -> list[Feed]:
     """Every estimator, in order of preference, with what stands in its way."""
@@ -58,9 +63,7 @@ def best(signals: Collection[str], vehicle: Vehicle | None, where: str = "the lo
     for feed in found:
         if feed.possible:
             return feed
-    lacks = "; ".join(
-        f"{f.estimator} lacks {', '.join(f.missing + tuple(f'[{p}] of the vehicle' for p in f.lacking))}" for f in found
-    )
+    lacks = "; ".join(f"{f.estimator} lacks {f.lacks(vehicle)}" for f in found)
     raise MissingSignal(
         f"{where} feeds no estimator: {lacks}",
         "at least longitudinal_acceleration and longitudinal_speed (kinematic)",
@@ -71,7 +74,8 @@ def best(signals: Collection[str], vehicle: Vehicle | None, where: str = "the lo
 def suggest_rate(log: Log, names: Collection[str]) -> float:
     """The rate at which to run, Hz: the quickest of the signals named, rounded up to a usual rate, from 20 to 200 Hz.
 
-    The Kalman form uses each value on the tick it arrives, so a rate above that of a signal costs nothing but time.
+    Each value is used on the tick it arrives, but its noise is that of one sample a tick: a rate above those of the signals
+    makes the Kalman form more cautious, so that it lags more (docs/sampling.md).
     """
     rates = [log[name].rate for name in names if name in log and len(log[name]) > 1]
     quickest = max((rate for rate in rates if rate == rate), default=NICE_RATES[0])

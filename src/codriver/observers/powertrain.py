@@ -73,7 +73,8 @@ def powertrain(vehicle: Vehicle, dt: float, carry: Scalars, u: Scalars, ok: Scal
     changed = both(negate(gear == carry["gear_before"]), negate(carry["tau"] == 0))
     since = select(changed, 0.0, carry["since_shift"] + dt)
     since = select(since < SHIFT_SECONDS, since, SHIFT_SECONDS)
-    shifting = select(ok["clutch"], open_share > OPEN_CLUTCH, since < SHIFT_SECONDS)
+    # Half a tick early, so that rounding does not decide where the time is a whole number of ticks.
+    shifting = select(ok["clutch"], open_share > OPEN_CLUTCH, since < SHIFT_SECONDS - dt / 2)
 
     sigma = _sigma(vehicle, carry["sigma_before"], u, ok)
     new = {"tau": tau, "gear_before": gear, "since_shift": since, "sigma_before": sigma}

@@ -2,8 +2,10 @@
 
 A causal observer lags, so its error against the truth of the moment is mostly lag: always answering zero can look better.
 The fair reference is delay-matched: the same observer fed with ideal signals of the truth, which lags alike and has no
-noise, no holes and no model error. Both are given, beside the answer zero and the kinematic model on the same log; and the
-share of time in which the truth of the moment lies in the 95 % band.
+noise and no model error. It gets each measurement when the log has it: how far the Kalman form lags depends on the rates
+of its rows (docs/sampling.md), and a reference with both rows on every tick would lag less. Both are given, beside the
+answer zero and the kinematic model on the same log; and the share of time in which the truth of the moment lies in the
+95 % band.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from codriver.estimate import Estimate
+from codriver.names import VOCABULARY
 from codriver.observers import build, design_scaled_gain
 from codriver.observers.intent import INTENTION
 from codriver.observers.jerk import jerk_observer
@@ -68,8 +71,7 @@ def judge(estimate: Estimate, truth: Log) -> list[Judgement]:
         )
     for of, label in (("model", "intentional jerk, lag taken out"), ("plan", "driver's planned jerk, lag taken out")):
         wanted = "intentional_acceleration" if of == "model" else "planned_acceleration"
-        reference = delay_matched(truth, wanted, dt, ell, preset, settings["form"])
-        lagged = np.interp(estimate.time, reference.time, reference.columns["intentional_jerk"])
+        lagged = delay_matched(estimate, truth, wanted).columns["intentional_jerk"]
         rows.append(
             _row(estimate, other, "intentional_jerk", "m/s^3", label, lagged, "longitudinal_jerk", valid, banded=False)
         )
@@ -80,23 +82,26 @@ def judge(estimate: Estimate, truth: Log) -> list[Judgement]:
     return rows
 
 
-def delay_matched(truth: Log, intention: str, dt: float, ell: float, preset: str, form: str) -> Estimate:
-    """The observer's answer to ideal signals whose intention is the truth's signal `intention`.
+def delay_matched(estimate: Estimate, truth: Log, intention: str) -> Estimate:
+    """The observer's answer to ideal signals whose intention is the truth's signal `intention`, on the estimate's ticks.
 
-    The ideal signals are v, v' + o_a, and u = v' - intention.
+    The ideal signals are v and v' + o_a, at the stamps that the estimate's log has for them, and u = v' - intention.
     """
-    time, rate = truth["longitudinal_speed"].time, truth["longitudinal_acceleration"].values
-    ones = np.ones_like(time)
-    made: dict[str, tuple[Array, str]] = {
-        "longitudinal_speed": (truth["longitudinal_speed"].values, "m/s"),
-        "longitudinal_acceleration": (rate + truth["acceleration_offset"].values, "m/s^2"),
-        "known_input": (rate - truth[intention].values, "m/s^2"),
-        "direction": (ones, "1"),
-        "inputs_known": (ones, "1"),
-    }
-    log = Log.of([Signal(name, time, values, unit) for name, (values, unit) in made.items()], "ideal signals")
-    observer = jerk_observer(design_scaled_gain(preset, dt, ell), form, INTENTION, "ideal")
-    return compile(observer).run(log)
+    settings = estimate.provenance
+    stamps = {name: estimate.log[name].time for name in ("longitudinal_speed", "longitudinal_acceleration")}
+    made = {name: at(truth, name, time) for name, time in stamps.items()}
+    made["longitudinal_acceleration"] += at(truth, "acceleration_offset", stamps["longitudinal_acceleration"])
+    signals = [Signal(name, time, made[name], VOCABULARY[name].unit) for name, time in stamps.items()]
+    clock = truth["longitudinal_speed"].time
+    known = truth["longitudinal_acceleration"].values - truth[intention].values
+    for name, values in (("known_input", known), ("direction", 1.0 + 0 * known), ("inputs_known", 1.0 + 0 * known)):
+        signals.append(Signal(name, clock, values, ""))
+    design = design_scaled_gain(settings["preset"], estimate.grid.dt, float(settings["ell"]))
+    program = compile(jerk_observer(design, settings["form"], INTENTION, "ideal"))
+    grid = Log.of(signals, "ideal signals").sample(
+        program.observer.channels, estimate.grid.dt, start=float(estimate.time[0]), stop=float(estimate.time[-1])
+    )
+    return Estimate("ideal", grid, program.run_grid(grid), INTENTION, program.observer.measured, settings, estimate.log)
 
 
 def at(log: Log, name: str, time: Array) -> Array:
