@@ -102,5 +102,5 @@ def noise_gain(design: ScaledGain, dt: float | None = None) -> tuple[float, floa
 
 
 def slope_ramp_error(design: ScaledGain) -> float:
-    """Steady jerk error per unit of do_a/dt (true less estimated), a pure number: what a road growing steeper does, whatever ell."""
+    """Steady jerk error per unit of do_a/dt (true less estimated), a pure number whatever ell: a road growing steeper."""
     return float(np.linalg.solve(-_error_dynamics(design), np.eye(4)[_OFFSET])[_JERK])
