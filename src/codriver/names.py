@@ -4,9 +4,10 @@ A standard name means one quantity, in one unit, with one sign, wherever it appe
 the exported C. Axes are ISO 8855 (x forward, y left, z up). Units inside are SI and radians; `display` is the unit in
 which people of the field read the quantity, and is used by reports alone.
 
-`low`, `high` bound what a road vehicle can plausibly show. They do not clip anything: a log outside them gets a warning
-that its unit or its scale is probably wrong. `hold` is how long, in seconds, the last value of a signal may stand in for a
-missing one before it counts as stale; quantities sent on change only (gear, switches) are held without limit.
+`low`, `high` bound what a road vehicle can plausibly show. They clip nothing: a log outside them gets a warning that
+its unit or its scale is probably wrong; a few odd values outside them are codes for "not valid" to the readers. `hold`
+is how long, in seconds, the last value of a signal may stand in for a missing one before it counts as stale; quantities
+sent on change only (gear, switches) are held without limit.
 """
 
 from __future__ import annotations

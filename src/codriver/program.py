@@ -17,13 +17,15 @@ from math import isfinite
 
 import numpy as np
 
-from codriver.errors import MissingSignal, UsageError
+from codriver.errors import LogError, MissingSignal, UsageError
 from codriver.estimate import Estimate
 from codriver.kernel.llvm import Compiled, compile_loop
 from codriver.kernel.record import Recorded
 from codriver.observers.observer import Observer
 from codriver.signals import Grid, Log
 from codriver.signals.signal import Array
+
+ANOTHER_CLOCK = 3600.0  # s between the ends of signals that cannot be a pause
 
 
 def compile(observer: Observer, outputs: Sequence[str] | None = None) -> Program:
@@ -69,17 +71,21 @@ class Program:
 
         Raises:
             MissingSignal: the log lacks a required signal.
+            LogError: required signals lie more than an hour apart: their clocks are not the same.
         """
         lacking = [name for name in self.observer.required if name not in log or not len(log[name])]
         if lacking:
+            told = [fault for fault in log.faults if any(fault.startswith(name) for name in lacking)]
             raise MissingSignal(
-                f"{self.observer.name} cannot run on {log.source or 'this log'}: it lacks {', '.join(lacking)}",
+                f"{self.observer.name} cannot run on {log.source or 'this log'}: it lacks {', '.join(lacking)}"
+                + (f" ({'; '.join(told)})" if told else ""),
                 f"the signals {', '.join(self.observer.required)}",
                 "map them in a names file, or use an estimator that does without; `codriver info LOG` says which",
             )
         if start is None:
             main = self.observer.measured or self.observer.required
             start = min((float(log[name].time[0]) for name in main if name in log), default=log.start)
+        _refuse_mixed_clocks(log, self.observer.required)
         grid = log.sample(self.observer.channels, self.observer.dt, start=start, stop=stop)
         values = self.run_grid(grid)
         return Estimate(
@@ -202,6 +208,24 @@ class Stepper:
                 "restore it into a stepper of the same design and outputs",
             )  # fmt: skip
         self._carry[: len(carry)] = list(carry.values())
+
+
+def _refuse_mixed_clocks(log: Log, names: Sequence[str]) -> None:
+    """Signals whose spans lie far apart have no tick in common.
+
+    Raises:
+        LogError: see `Program.run`.
+    """
+    if not names:
+        return
+    late = max(names, key=lambda name: float(log[name].time[0]))
+    early = min(names, key=lambda name: float(log[name].time[-1]))
+    if log[late].time[0] - log[early].time[-1] > ANOTHER_CLOCK:
+        raise LogError(
+            f"{log.source or 'this log'}: {early} ends at {log[early].time[-1]:.10g} s, "
+            f"{late} begins at {log[late].time[0]:.10g} s", "signals on one clock",
+            "they bear stamps of two clocks: record them on one, or shift one file's time column",
+        )  # fmt: skip
 
 
 def provenance(observer: Observer) -> dict[str, str]:

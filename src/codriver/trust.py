@@ -10,7 +10,9 @@ looked at, where the estimate is valid:
   warning, above 6.25 (2.5 times) the band is wrong;
 * stretches where one of the two is above 16 for at least 1 s: wheel slip, a wrong ratio, a sensor fault;
 * the sensors against each other: accelerometer and change of speed must go together, else a sign or a unit is wrong;
-* the accelerometer offset: more than 3 m/s^2 is no road.
+* the accelerometer offset: more than 3 m/s^2 is no road;
+* brake and known input: a brake that is always pressed, a powertrain that adds more than the vehicle shows;
+* used signals most of whose samples no vehicle can show: a unit or a scale is wrong.
 """
 
 from __future__ import annotations
@@ -25,6 +27,15 @@ from codriver.signals import Grid, Log
 from codriver.signals.signal import Array
 
 WIDE, WRONG, BAD_STRETCH, STEEP = 2.25, 6.25, 16.0, 3.0
+# Known input over accelerometer, rms: a quarter to a third in the drives we have.
+POWERFUL = 1.5
+# Ratios of (change of speed) / accelerometer that betray a unit, and what is then likely wrong.
+_SLOPES = (
+    (3.6, "the speed looks like km/h read as m/s"), (1 / 3.6, "the speed looks like m/s read as km/h"),
+    (2.237, "the speed looks like mph read as m/s"), (0.447, "the speed looks like m/s read as mph"),
+    (1.609, "the speed looks like mph read as km/h"), (0.621, "the speed looks like km/h read as mph"),
+    (9.807, "the accelerometer looks like g read as m/s^2"), (0.102, "the accelerometer looks like m/s^2 read as g"),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -97,15 +108,40 @@ def check_estimate(
     if "acceleration_offset" in values and valid.any():
         steep = valid & (np.abs(values["acceleration_offset"]) > STEEP)
         if steep.mean() > 0.01:
+            always = steep.mean() > 0.2
             findings.append(Finding(
-                "bad", f"the accelerometer offset exceeds {STEEP:g} m/s^2 for {steep.mean():.0%} of the time, more than any road: "
-                "is its axis, unit or sign right?", _spans(steep, grid),
+                "bad" if always else "warn", f"the accelerometer offset exceeds {STEEP:g} m/s^2 for {steep.mean():.0%} of the "
+                "time, more than any road: "
+                + ("is its axis, unit or sign right?" if always else "a slide, a crash, a bad sensor?"), _spans(steep, grid),
             ))  # fmt: skip
-    findings += [Finding("warn", fault) for fault in log.faults]
+    findings += _driver(values, valid, grid)
+    absurd = Log({name: log[name] for name in grid.values if name in log}).implausible()
+    findings += [Finding("bad" if fault in absurd else "warn", fault) for fault in log.faults]
     order = {"bad": 0, "warn": 1, "ok": 2}
     return Check(
         tuple(sorted(findings, key=lambda f: order[f.severity])), float(valid.mean()) if valid.size else 0.0, nis, lean
     )
+
+
+def _driver(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid) -> list[Finding]:
+    """Whether brake and powertrain say what a drive can show."""
+    findings = []
+    if "braking" in values and valid.any() and (share := float(np.mean(values["braking"][valid] > 0.5))) > 0.9:
+        findings.append(Finding(
+            "bad", f"the driver seems to brake for {share:.0%} of the valid time: a rest pressure above the brake threshold, or a "
+            "switch with the opposite meaning? See offset in the names file, brake_threshold in the vehicle file",
+        ))  # fmt: skip
+    measured = grid.values.get("longitudinal_acceleration")
+    if "known_input" in values and measured is not None:
+        there = valid & np.isfinite(measured)
+        size = float(np.sqrt(np.mean(measured[there] ** 2))) if there.any() else 0.0
+        known = float(np.sqrt(np.mean(values["known_input"][there] ** 2))) if there.any() else 0.0
+        if known > POWERFUL * max(size, 0.5):
+            findings.append(Finding(
+                "bad", f"what the powertrain adds to the driver's request is {known:.3g} m/s^2 rms, where the accelerometer shows "
+                f"{size:.3g} m/s^2: a wrong unit or scale of torque or pedal, a wrong gear, or another vehicle's parameters",
+            ))  # fmt: skip
+    return findings
 
 
 def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid) -> Finding:
@@ -116,6 +152,10 @@ def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: G
         reasons.append(f"standing {np.mean(values['standstill'] > 0.5):.0%}")
     if "inputs_known" in values:
         reasons.append(f"inputs missing {np.mean(values['inputs_known'] < 0.5):.0%}")
+        if "standstill" in values:
+            rest = ~valid & (values["standstill"] < 0.5) & (values["inputs_known"] > 0.5)
+            if rest.any() and rest.mean() > 0.05:
+                reasons.append(f"slower than 1 m/s, before the first speed or not settled {rest.mean():.0%}")
     text = f"{share:.0%} of {len(grid) * grid.dt:.1f} s is valid" + (f" ({', '.join(reasons)})" if reasons else "")
     return Finding("bad" if share < 0.05 else "warn" if share < 0.5 else "ok", text, _spans(~valid, grid))
 
@@ -143,10 +183,12 @@ def _row(
     leaning, count = _blocks(normal, used, second)
     scattering = np.add.reduceat(normal**2, np.arange(0, normal.size, second)) / np.maximum(count, 1)
     worst = np.maximum(leaning, scattering)
-    bad = np.repeat((worst > BAD_STRETCH) & (count >= 5), second)[: len(grid)] & valid
+    # The second in which the estimate becomes valid is left out: what the driver did before was unknown to the filter.
+    whole = np.logical_and.reduceat(valid, np.arange(0, normal.size, second))
+    bad = np.repeat((worst > BAD_STRETCH) & (count >= 5) & whole, second)[: len(grid)]
     if bad.any():
         findings.append(Finding(
-            "warn", f"{row}: {bad.sum() * grid.dt:.1f} s where the innovations are up to {worst.max() ** 0.5:.0f} times "
+            "warn", f"{row}: {bad.sum() * grid.dt:.1f} s where the innovations are up to {worst[whole].max() ** 0.5:.0f} times "
             "their band: slip, a wrong ratio, or a sensor fault", _spans(bad, grid),
         ))  # fmt: skip
     return findings
@@ -172,7 +214,13 @@ def _sensors_agree(log: Log) -> list[Finding]:
     dv = np.diff(v[: steps * 50 : 50])
     good = np.isfinite(mean_a) & np.isfinite(dv)
     mean_a, dv = mean_a[good], dv[good]
-    if good.sum() < 20 or dv.std() < 0.1 or mean_a.std() == 0:
+    if good.sum() >= 20 and dv.std() >= 0.1 and np.ptp(mean_a) < 1e-6:
+        return [
+            Finding(
+                "bad", f"the accelerometer shows {mean_a[0]:.3g} m/s^2 all the time while the speed changes; stuck?"
+            )
+        ]
+    if good.sum() < 20 or dv.std() < 0.1:
         return [Finding("ok", "speed changes too little to hold it against the accelerometer")]
     slope = float(np.cov(mean_a, dv)[0, 1] / mean_a.var(ddof=1))
     correlation = float(np.corrcoef(mean_a, dv)[0, 1])
@@ -182,7 +230,10 @@ def _sensors_agree(log: Log) -> list[Finding]:
     if correlation < 0.5:
         return [Finding("bad", f"{said}; they hardly go together: wrong axis, wrong clock or wrong signal?")]
     if not 0.7 < slope < 1.4:
-        return [Finding("warn", f"{said} where 1 is right; check the units of both, and the tyre radius")]
+        likely = [text for ratio, text in _SLOPES if abs(np.log(slope / ratio)) < 0.1 and correlation > 0.8]
+        hint = f"; {likely[0]}" if likely else ""
+        severity = "warn" if 0.4 < slope < 2.5 else "bad"
+        return [Finding(severity, f"{said} where 1 is right{hint}; check the units of both, and the tyre radius")]
     return [Finding("ok", f"{said} (1 and 1 are right)")]
 
 

@@ -1,12 +1,14 @@
 """The application: commands, and what happens to errors.
 
-Exit codes: 0 done, 1 the data does not allow it, 2 misuse, 130 interrupted.
+Exit codes: 0 done, 1 the data does not allow it, 2 misuse, 130 interrupted, 143 terminated.
 """
 
 from __future__ import annotations
 
 import os
+import signal
 import sys
+from types import FrameType
 from typing import Annotated
 
 import typer
@@ -47,14 +49,37 @@ def _root(
 
 def main() -> None:
     """Run the command line; errors of the data become a message and an exit code, never a traceback."""
+    # `kill` ends a program before it can clear up; as an exception it passes all the clearing up.
+    before = signal.signal(signal.SIGTERM, _terminated)
+    try:
+        _run()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+class _Terminated(BaseException):
+    """The program was told to end."""
+
+
+def _terminated(number: int, frame: FrameType | None) -> None:
+    raise _Terminated
+
+
+def _run() -> None:
+    """The application, its errors turned into messages and exit codes."""
     try:
         app()
     except CodriverError as error:
-        typer.secho(f"codriver: {error}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
+        typer.secho(
+            f"codriver: {_printable(str(error))}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None
+        )
         raise SystemExit(error.exit_code) from None
     except KeyboardInterrupt:
-        typer.echo("codriver: interrupted; nothing was written", err=True)
+        typer.echo("codriver: interrupted; no result was written", err=True)
         raise SystemExit(130) from None
+    except _Terminated:
+        typer.echo("codriver: terminated; no result was written", err=True)
+        raise SystemExit(143) from None
     except BrokenPipeError:
         raise SystemExit(0) from None
     except MemoryError:
@@ -72,3 +97,8 @@ def main() -> None:
             err=True,
         )
         raise SystemExit(1) from None
+
+
+def _printable(text: str) -> str:
+    """Text whose control characters cannot disturb a terminal: damaged files are quoted in messages."""
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -59,17 +59,14 @@ def estimate_log(
     truth: Log | None = None,
 ) -> Estimate:
     """What the command does; the demo calls it too, with the truth for its report."""
+    from codriver.cli.options import check_inputs
     from codriver.cli.terminal import command_line, say, working
     from codriver.errors import UsageError
     from codriver.logs import read
-    from codriver.logs.write import check_output
     from codriver.vehicles import load_vehicle
 
-    check_output(out)
-    if report is not None and report.suffix.lower() not in (".html", ".htm"):
-        raise UsageError(f"--report {report}", "a name ending in .html", "rename it")
-    if report is not None and not report.resolve().parent.is_dir():
-        raise UsageError(f"--report {report}: the folder does not exist", "an existing folder", "create it first")
+    check_inputs(path, dbc, names)
+    _check_outputs(out, report, path)
     if rate is not None and not 1 <= rate <= 10000:
         raise UsageError(f"--rate {rate:g}", "1 to 10000 Hz", "choose a rate near the accelerometer's, such as 100")
     vehicle = load_vehicle(vehicle_name) if vehicle_name is not None else None
@@ -79,6 +76,7 @@ def estimate_log(
         name, why = _choose(estimator, recorded, vehicle)
         stage(f"estimating: {name}")
         result = run_estimator(name, recorded, vehicle, ell=ell, rate=rate, preset=preset, form=form)
+        _refuse_empty(result)
         stage(f"writing {out.name}")
         command = command_line()
         _write(result, out, report, command, truth, stage)
@@ -90,6 +88,49 @@ def estimate_log(
     return result
 
 
+def _check_outputs(out: Path, report: Path | None, log: Path) -> None:
+    """Whether result and report can be written, asked before the long work.
+
+    Raises:
+        UsageError: they cannot, or the result would replace the recording.
+    """
+    import os
+
+    from codriver.errors import UsageError
+    from codriver.logs.write import check_output
+
+    check_output(out)
+    if out.exists() and out.samefile(log):
+        raise UsageError(f"-o {out} is the recording itself", "another name", "choose another -o; recordings are kept")
+    if report is None:
+        return
+    folder = report.parent
+    if report.suffix.lower() not in (".html", ".htm"):
+        raise UsageError(f"--report {report}", "a name ending in .html", "rename it")
+    if not folder.is_dir():
+        raise UsageError(f"--report {report}: the folder does not exist", "an existing folder", "create it first")
+    if report.is_dir() or not os.access(folder, os.W_OK):
+        raise UsageError(f"--report {report} cannot be written", "a file in a folder you may write", "choose another")
+
+
+def _refuse_empty(result: Estimate) -> None:
+    """An estimate without one valid moment is no result.
+
+    Raises:
+        LogError: no tick is valid; the message says why.
+    """
+    from codriver.errors import LogError
+
+    if result.valid.any():
+        return
+    why = [f.text for f in result.check().findings if f.severity != "ok" and "too few to judge" not in f.text]
+    raise LogError(
+        f"{result.log.source}: {result.observer} has no valid moment in it. {'; '.join(why)}",
+        "a drive in which the vehicle moves and all signals are there together, for some seconds at least",
+        "see with `codriver info LOG` what the log holds and from when to when; nothing was written",
+    )
+
+
 def _choose(estimator: str, log: Log, vehicle: Vehicle | None) -> tuple[str, str]:
     """The estimator's name, and why it was taken where the log decided."""
     from codriver.observers.feed import best, feeds
@@ -97,13 +138,13 @@ def _choose(estimator: str, log: Log, vehicle: Vehicle | None) -> tuple[str, str
 
     if estimator != "intent":
         return get_estimator(estimator).name, ""
-    feed = best(log, vehicle, log.source)
+    unusable = [fault for fault in log.faults if fault.endswith("it is left out")]
+    feed = best(log, vehicle, log.source + (f" ({'; '.join(unusable)})" if unusable else ""))
     better = []
     for other in feeds(log, vehicle):
         if other.estimator == feed.estimator:
             break
-        lacks = [*other.missing, *(["a vehicle (--vehicle)"] if vehicle is None else [f"[{p}]" for p in other.lacking])]
-        better.append(f"{other.estimator} lacks {', '.join(lacks)}")
+        better.append(f"{other.estimator} lacks {other.lacks(vehicle)}")
     return feed.estimator, "the best this log can feed" + (f" ({'; '.join(better)})" if better else "")
 
 
@@ -146,6 +187,9 @@ def summarise(result: Estimate, out: str, report: str | None, why: str) -> dict[
     """What the terminal shows and --json prints."""
     import numpy as np
 
+    def number(value: float | np.floating[Any]) -> float | None:
+        return float(value) if np.isfinite(value) else None  # JSON knows no NaN
+
     check = result.check()
     valid = result.valid
     rows: dict[str, dict[str, float | str | None]] = {}
@@ -154,10 +198,10 @@ def summarise(result: Estimate, out: str, report: str | None, why: str) -> dict[
         sd = result.sd(output.name)
         rows[output.name] = {
             "unit": output.unit,
-            "rms": float(np.sqrt(np.mean(values**2))) if values.size else None,
-            "p5": float(np.quantile(values, 0.05)) if values.size else None,
-            "p95": float(np.quantile(values, 0.95)) if values.size else None,
-            "mean_sd": float(np.mean(sd[valid])) if sd is not None and values.size else None,
+            "rms": number(np.sqrt(np.mean(values**2))) if values.size else None,
+            "p5": number(np.quantile(values, 0.05)) if values.size else None,
+            "p95": number(np.quantile(values, 0.95)) if values.size else None,
+            "mean_sd": number(np.mean(sd[valid])) if sd is not None and values.size else None,
         }
     shifts = np.flatnonzero(np.diff(result.flag("gear_shift").astype(int)) == 1).size
     speed = result.grid.values.get("longitudinal_speed")

@@ -14,22 +14,21 @@ def info(
     log: LogPath, dbc: Dbc = None, names: Names = None, vehicle: VehicleName = None, bus: Bus = None, json: Json = False
 ) -> None:
     """Say what a log holds, which estimators it can feed, what is missing, and which is the best available."""
-    from codriver.errors import LogError
+    from codriver.cli.options import check_inputs
     from codriver.logs import open_recording
-    from codriver.logs.read import read_recording
+    from codriver.logs.read import own_names, read_recording
     from codriver.observers.feed import best, feeds
     from codriver.signals import Log
     from codriver.vehicles import load_vehicle
 
+    check_inputs(log, dbc, names)
     car = load_vehicle(vehicle) if vehicle is not None else None
     recording = open_recording(log, dbc=dbc, bus=bus)
     channels = recording.channels()
-    try:
-        signals = read_recording(recording, names)
-    except LogError:
-        if names is not None:
-            raise
+    if names is None and recording.default_names is None and not own_names(recording).entries:
         signals = Log({}, str(log), tuple(recording.faults), tuple(sorted(channels)))  # nothing is mapped yet
+    else:
+        signals = read_recording(recording, names)
     # Without a vehicle, say what the log alone allows: parameters are told apart from signals.
     found = feeds(signals, car)
     fed = [f for f in found if not f.missing]
@@ -59,7 +58,7 @@ def info(
         "vehicle": car.name if car is not None else None,
     }
     if json:
-        typer.echo(json_module.dumps(summary, indent=2, ensure_ascii=False))
+        typer.echo(json_module.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False))
     else:
         _show(summary)
 
@@ -72,7 +71,10 @@ def _show(summary: dict[str, Any]) -> None:
     from codriver.cli.terminal import console
 
     out = console()
-    span = f", {summary['from_s']:.2f} to {summary['to_s']:.2f} s" if summary["signals"] else ""
+    span = ""
+    if summary["signals"]:
+        start, stop = summary["from_s"], summary["to_s"]
+        span = f", {stop - start:.1f} s ({start:.2f} to {stop:.2f} s)"
     out.print(f"[bold]{escape(summary['log'])}[/]: {escape(summary['format'])}{span}\n")
     if summary["signals"]:
         table = Table(box=None, pad_edge=False)
@@ -91,10 +93,13 @@ def _show(summary: dict[str, Any]) -> None:
             table.add_row(s["name"], s["unit"], str(s["samples"]), *numbers, str(s["missing"]), escape(s["source"]))
         out.print(table)
     else:
-        out.print("no channel has a standard name: map them in a names file (--names)")
+        out.print("no channel has a standard name: say in a names file which is which, and give it with --names")
+        out.print(escape(_example(summary["channels"])))
     if summary["unmapped"]:
-        listed = ", ".join(summary["unmapped"][:60]) + (", ..." if len(summary["unmapped"]) > 60 else "")
-        out.print(f"\nnot mapped ({len(summary['unmapped'])}): {escape(listed)}")
+        # Whoever has still to write a names file wants the whole list.
+        most = 24 if summary["signals"] else 300
+        more = ", ... (--json lists all)" if len(summary["unmapped"]) > most else ""
+        out.print(f"\nnot mapped ({len(summary['unmapped'])}): {escape(', '.join(summary['unmapped'][:most]))}{more}")
     for fault in summary["faults"]:
         out.print(f"[yellow]warn[/] {escape(fault)}")
     out.print("\n[bold]estimators[/]")
@@ -121,3 +126,16 @@ def _show(summary: dict[str, Any]) -> None:
         out.print(
             "\nno estimator can be fed: kinematic, the least, needs longitudinal_acceleration and longitudinal_speed"
         )
+
+
+def _example(channels: list[dict[str, str]]) -> str:
+    """The beginning of a names file for these channels."""
+    likely = [c for c in channels if "speed" in c["name"].lower() and "engine" not in c["name"].lower()]
+    vehicle = [c for c in likely if "vehicle" in c["name"].lower()]
+    chosen = next(iter([*vehicle, *likely, *channels]), {"name": "Message.Signal", "unit": ""})
+    unit = chosen["unit"] or "km/h"
+    source = json_module.dumps(chosen["name"], ensure_ascii=False)
+    return (
+        "it begins like this (docs/names.md has the standard names):\n\n"
+        f"  [longitudinal_speed]\n  source = {source}\n  unit = {json_module.dumps(unit, ensure_ascii=False)}\n"
+    )

@@ -25,7 +25,9 @@ Json = Annotated[bool, typer.Option("--json", help="Write the summary as JSON to
 Ell = Annotated[
     float | None,
     typer.Option(
-        "--ell", help="The knob: larger is quicker and noisier. Default: the preset's (2).", show_default=False
+        "--ell",
+        help="The knob: larger is quicker and noisier. Default: the preset's (2 for bisoffi2017).",
+        show_default=False,
     ),
 ]
 PresetName = Annotated[str, typer.Option("--preset", help="Noise of a paper: bisoffi2017 or bisoffi2015.")]
@@ -38,3 +40,20 @@ EstimatorName = Annotated[
         show_default=False,
     ),
 ]
+
+
+def check_inputs(log: Path, dbc: Path | None, names: Path | None) -> None:
+    """Whether the files named are there at all.
+
+    Raises:
+        UsageError: one is not; the message says which.
+    """
+    from codriver.errors import UsageError
+
+    for path, what, option in (
+        (log, "a recording", "LOG"),
+        (dbc, "a CAN database", "--dbc"),
+        (names, "a names file", "--names"),
+    ):
+        if path is not None and not path.exists():
+            raise UsageError(f"{option} {path} does not exist", what, "check the path")

@@ -78,8 +78,10 @@ def load_names(path: str | Path) -> NamesFile:
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise NamesError(f"cannot read {path}: {error}", "a TOML file", "check the path") from None
+    except OSError as error:
+        raise NamesError(f"cannot read {path}: {error.strerror}", "a TOML file", "check the path") from None
+    except UnicodeDecodeError:
+        raise NamesError(f"{path} is no text", "a TOML file in UTF-8", "check that it is the names file") from None
     return parse_names(text, str(path))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from codriver.errors import LogError, NamesError, UnitError
-from codriver.logs.mend import find_faults, mend_clock
+from codriver.logs.mend import compare_clocks, drop_codes, find_faults, mend_clock, named
 from codriver.logs.names_file import Entry, NamesFile, load_names
 from codriver.logs.recording import RawSignal, Recording
 from codriver.logs.registry import ReadOptions, find_reader
@@ -95,6 +95,8 @@ def read_recording(recording: Recording, names: str | Path | NamesFile | None = 
             "at least one channel that the recording holds",
             "`codriver info LOG` lists the channels; check the names file, the DBC and the bus",
         )
+    signals, told = compare_clocks(signals)
+    faults += told
     used = {source for entry in mapping.entries.values() for source in entry.source}
     log = Log.of(signals, recording.path)
     all_faults = (*recording.faults, *faults, *log.implausible())
@@ -118,7 +120,7 @@ def _standard(entry: Entry, parts: list[RawSignal], faults: list[str]) -> Signal
     mended = []
     for source, part in zip(entry.source, parts, strict=True):
         time, values, notes = mend_clock(np.asarray(part.time, float), np.asarray(part.values, float))
-        faults.extend(f"{entry.name} ({source}): {note}" for note in notes)
+        faults.extend(f"{named(entry.name, source)}: {note}" for note in notes)
         try:
             gain, shift = entry.conversion(part.unit)
         except UnitError as error:
@@ -136,5 +138,7 @@ def _standard(entry: Entry, parts: list[RawSignal], faults: list[str]) -> Signal
     signal = Signal(
         entry.name, time, values / len(mended) if len(mended) > 1 else values, target, " + ".join(entry.source)
     )
-    faults.extend(find_faults(signal))
+    missing = find_faults(signal)  # before the codes below become NaN too, which would be told twice
+    signal, codes = drop_codes(signal)
+    faults.extend([*missing, *codes])
     return signal

@@ -92,7 +92,11 @@ def find_reader(path: Path) -> Reader:
     known = sorted({suffix for candidate in formats() for suffix in candidate.suffixes})
     folders = sorted(candidate.title for candidate in formats() if candidate.folder)
     raise FormatError(
-        f"{path} is a folder of no known layout" if path.is_dir() else f"'{path.suffix}' is no known suffix ({path})",
+        f"{path} is a folder of no known layout"
+        if path.is_dir()
+        else f"{path} has no suffix"
+        if not path.suffix
+        else f"'{path.suffix}' is no known suffix ({path})",
         f"a file ending in {', '.join(known)}, or a folder: {'; '.join(folders)}",
         "convert the recording to one of these, such as CSV or Parquet with a column 'time'",
     )

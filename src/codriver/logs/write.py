@@ -56,14 +56,15 @@ def check_output(path: str | Path) -> Path:
         UsageError: the suffix is unknown, the folder does not exist or may not be written, or asammdf is missing.
     """
     path = Path(path)
+    if path.is_dir():
+        raise UsageError(f"{path} is a folder", "the name of a file", "give a file name inside the folder")
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(
-            f"cannot write '{path.name}': '{path.suffix}' is no format to write",
+            f"cannot write '{path.name}': "
+            + (f"'{path.suffix}' is no format to write" if path.suffix else "no suffix"),
             f"a name ending in {', '.join(SUFFIXES)}",
             "choose one of these suffixes",
         )
-    if path.is_dir():
-        raise UsageError(f"{path} is a folder", "the name of a file", "give a file name inside the folder")
     folder = path.parent
     if not folder.is_dir():
         raise UsageError(

@@ -29,6 +29,10 @@ from codriver.models import intention_model
 from codriver.observers.observer import Certificate, stable
 from codriver.signals.signal import Array
 
+# Far beyond both, the Riccati equations lose their digits; what lies between is designed and certified.
+ELL_RANGE = (0.01, 100.0)
+DT_RANGE = (1e-6, 100.0)  # s
+
 
 @dataclass(frozen=True)
 class Preset:
@@ -85,7 +89,7 @@ def design_scaled_gain(preset: Preset | str, dt: float, ell: float | None = None
         ell: the knob: larger is quicker and noisier; None takes the preset's.
 
     Raises:
-        UsageError: no such preset; ell or dt not positive.
+        UsageError: no such preset; ell or dt out of range.
         DesignError: the observer would not be stable, or the tick is too long for it.
     """
     if isinstance(preset, str):
@@ -93,8 +97,12 @@ def design_scaled_gain(preset: Preset | str, dt: float, ell: float | None = None
             raise UsageError(f"no preset '{preset}'", f"one of {', '.join(PRESETS)}", "choose one, or pass a Preset")
         preset = PRESETS[preset]
     ell = preset.ell if ell is None else ell
-    if not (np.isfinite(ell) and ell > 0) or not (np.isfinite(dt) and dt > 0):
-        raise UsageError(f"ell = {ell}, dt = {dt} s", "both positive", "the papers use ell from 0.8 to 3")
+    if not ELL_RANGE[0] <= ell <= ELL_RANGE[1]:
+        bounds = f"{ELL_RANGE[0]:g} to {ELL_RANGE[1]:g}"
+        raise UsageError(f"ell = {ell:g}", f"a number from {bounds}", "start from 2; the papers use 0.8 to 3")
+    if not DT_RANGE[0] <= dt <= DT_RANGE[1]:
+        bounds = f"{DT_RANGE[0]:g} to {DT_RANGE[1]:g} s"
+        raise UsageError(f"dt = {dt:g} s", f"a tick of {bounds}", "choose the sensors' tick, such as 0.01 s")
     from scipy.linalg import solve_continuous_are, solve_discrete_are
 
     model = intention_model()

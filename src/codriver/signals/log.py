@@ -105,8 +105,22 @@ class Log(Mapping[str, Signal]):
                 continue
             outside = float(np.mean((finite < entry.low) | (finite > entry.high)))
             if outside > 0.01:
+                unit = "" if entry.unit == "1" else f" {entry.unit}"
                 sentences.append(
-                    f"{name}: {outside:.0%} of the samples lie outside {entry.low:g} to {entry.high:g} {entry.unit} "
-                    f"(found {finite.min():g} to {finite.max():g}); is its unit right in the names file?"
+                    f"{name}: {outside:.0%} of the samples lie outside {entry.low:g} to {entry.high:g}{unit} "
+                    f"(found {finite.min():.4g} to {finite.max():.4g}); {_likely(name, float(finite.max()))}"
                 )
         return sentences
+
+
+def _likely(name: str, highest: float) -> str:
+    """What is probably wrong with a signal that reaches `highest` and should not."""
+    if name == "gear":
+        return "gears are -1, 0, 1, 2, ...; positions of a selector (P, R, N, D) and codes are none"
+    if name == "accelerator_pedal" and 95 < highest <= 105:
+        return 'percent? then unit = "%" in the names file'
+    if name in ("accelerator_pedal", "clutch") and highest > 105:
+        return "counts? then scale = 1 / (the count of the pedal fully pressed) in the names file"
+    if name == "brake_pressure":
+        return 'is its unit right in the names file ("bar", "kPa", "Pa")?'
+    return "is its unit right in the names file?"

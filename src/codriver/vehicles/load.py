@@ -82,8 +82,10 @@ def load_vehicle(vehicle: str | Path) -> Vehicle:
         return parse_vehicle(file.read_text(encoding="utf-8"), f"built-in {vehicle}")
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise VehicleError(f"cannot read {path}: {error}", "a TOML file", "check the path") from None
+    except OSError as error:
+        raise VehicleError(f"cannot read {path}: {error.strerror}", "a TOML file", "check the path") from None
+    except UnicodeDecodeError:
+        raise VehicleError(f"{path} is no text", "a TOML file in UTF-8", "check that it is the vehicle file") from None
     return parse_vehicle(text, str(path))
 
 
