@@ -11,7 +11,8 @@ import pytest
 from codriver.errors import UsageError
 from codriver.simulate.bus import BusParameters, Hole, transmit
 from codriver.simulate.can_layout import Field, Message, dbc_text, encode
-from codriver.simulate.car import GRAVITY, Car, CarParameters
+from codriver.simulate.car import GRAVITY, Car
+from codriver.simulate.car_parameters import CarParameters
 from codriver.simulate.demo import HOLE, demo_drive, write_demo
 from codriver.simulate.drive import STEP, drive
 from codriver.simulate.network import MESSAGES, STANDARD, names_text

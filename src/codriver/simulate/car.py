@@ -1,20 +1,17 @@
-"""The car: its parameters, and the motion of its mass.
+"""The motion of the car's mass.
 
     M v' = tau T_c - F_b - M g sin(alpha) - kappa_1 - kappa_2 v^2           (2017 eq. 2a and 19)
 
 with T_c the torque that passes the clutch (N m, equal to the engine's T_e while the clutch is locked), F_b = c_b p_b,
 kappa_1 and F_b opposing the motion. At standstill they are static friction: the car stays while the other forces are
 smaller than they are.
-
-The numbers of `CarParameters` are those of the 2017 paper where it gives them. They belong to the simulator: an
-estimator gets its own from a vehicle file, and may be wrong about them.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
+from codriver.simulate.car_parameters import CarParameters
 from codriver.simulate.powertrain import Powertrain
 
 GRAVITY = 9.80665  # m/s^2

@@ -1,4 +1,8 @@
-"""Parameters of the simulated car: its own, never shared with an estimator."""
+"""Parameters of the simulated car.
+
+The numbers are those of the 2017 paper where it gives them. They belong to the simulator: an estimator gets its own from a
+vehicle file, and may be wrong about them.
+"""
 
 from __future__ import annotations
 

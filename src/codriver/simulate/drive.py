@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from codriver.signals.signal import Array
-from codriver.simulate.car import Car, CarParameters
+from codriver.simulate.car import Car
+from codriver.simulate.car_parameters import CarParameters
 from codriver.simulate.driver import Driver
 from codriver.simulate.powertrain import T_MAX
 from codriver.simulate.road import Road

@@ -23,7 +23,8 @@ import random
 import numpy as np
 
 from codriver.signals.signal import Array
-from codriver.simulate.car import GRAVITY, CarParameters
+from codriver.simulate.car import GRAVITY
+from codriver.simulate.car_parameters import CarParameters
 from codriver.simulate.feet import Feet
 from codriver.simulate.plan import Plan, duration_of
 from codriver.simulate.road import Road

@@ -20,10 +20,8 @@ going.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from codriver.simulate.car import CarParameters
+from codriver.simulate.car_parameters import CarParameters
 
 LOCKED, CUT, OPEN, CLOSE, STAND, LAUNCH = range(6)
 T_MAX = 400.0  # clutch torque when fully closed, N m
