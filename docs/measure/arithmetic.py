@@ -1,6 +1,6 @@
 """Figures of docs/bit-contract.md and docs/c-export.md: operations, compile times, error of the float export.
 
-    python docs/measure/arithmetic.py            needs gcc for the float errors, numba for its compile time
+    python docs/measure/arithmetic.py            needs gcc for the float errors
 """
 
 # ruff: noqa: T201
@@ -9,7 +9,6 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
-from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
 
@@ -18,7 +17,6 @@ from drives import table
 import codriver as cd
 from codriver.export import export_c
 from codriver.kernel.llvm import compile_loop
-from codriver.kernel.record import Recorded
 from codriver.observers import ESTIMATORS
 
 CAR = cd.load_vehicle("bisoffi2017")
@@ -49,38 +47,6 @@ def float_error(program: cd.Program) -> str:
         return said.strip().splitlines()[-1].rsplit(" ", 1)[-1]
 
 
-def numba_seconds(recorded: Recorded) -> float:
-    """Time that numba takes to compile the same list of operations as a loop over samples."""
-    import numba
-
-    sign = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "ne": "!="}
-    lines = ["def run(n, carry, given, made):", *(f"    c{k} = carry[{k}]" for k in range(len(recorded.carry)))]
-    lines.append("    for k in range(n):")
-    for number, i in enumerate(recorded.instructions):
-        x = [f"t{operand}" for operand in i.operands]
-        if i.kind in ("constant", "carry", "input"):
-            text = {"constant": repr(float(i.value)), "carry": f"c{i.value}", "input": f"given[{i.value}, k]"}[i.kind]
-        elif i.kind in sign:
-            text = f"{x[0]} {sign[i.kind]} {x[1]}"
-            text = text if i.kind in ("add", "sub", "mul", "div") else f"1.0 if {text} else 0.0"
-        else:
-            text = {
-                "neg": "-{0}", "sqrt": "math.sqrt({0})", "square": "{0} * {0}", "twice": "{0} + {0}", "inverse": "1.0 / {0}",
-                "abs": "abs({0})", "not": "1.0 if {0} == 0.0 else 0.0", "where": "{1} if {0} != 0.0 else 0.0",
-                "pick": "({1} if {0} != 0.0 else {2}) + 0.0", "and": "1.0 if {0} != 0.0 and {1} != 0.0 else 0.0",
-                "or": "1.0 if {0} != 0.0 or {1} != 0.0 else 0.0",
-            }[i.kind].format(*x, *[""] * (3 - len(x)))  # fmt: skip
-        lines.append(f"        t{number} = {text}")
-    lines += [f"        made[{k}, k] = t{i}" for k, i in enumerate(recorded.output_results)]
-    lines += [f"        c{k} = t{i}" for k, i in enumerate(recorded.carry_results)]
-    space: dict = {"math": __import__("math")}
-    exec("\n".join(lines), space)
-    loop = numba.njit(error_model="numpy")(space["run"])
-    start = perf_counter()
-    loop.compile((numba.int64, numba.float64[::1], numba.float64[:, ::1], numba.float64[:, ::1]))
-    return perf_counter() - start
-
-
 def main() -> None:
     """Measure and print."""
     cd.compile(cd.build("kinematic"))  # wakes CasADi and LLVM once
@@ -90,14 +56,13 @@ def main() -> None:
         program, jerk = cd.compile(observer), cd.compile(observer, [JERK[name], "valid"])
         record = best(lambda observer=observer: observer.record())
         translate = best(lambda program=program: compile_loop(program.recorded))
-        numba_time = f"{numba_seconds(program.recorded):.1f}" if find_spec("numba") else "no numba"
         state = len(program.recorded.carry)
         rows.append([
             name, form, str(program.recorded.operations()), str(jerk.recorded.operations()), str(state),
-            f"{1e3 * record:.0f}", f"{1e3 * translate:.0f}", numba_time, float_error(program),
+            f"{1e3 * record:.0f}", f"{1e3 * translate:.0f}", float_error(program),
         ])  # fmt: skip
     head = ["estimator", "form", "operations", "jerk and valid only", "carried scalars"]
-    head += ["record, ms", "LLVM, ms", "numba, s", "float error"]
+    head += ["record, ms", "LLVM, ms", "float error"]
     print(table(head, rows))
     rows = []
     for dt in (0.001, 0.005, 0.01, 0.05):

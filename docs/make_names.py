@@ -1,0 +1,94 @@
+"""Tables of these pages that are made from the code, so that they cannot go out of date.
+
+    python docs/make_names.py           rewrites the tables
+    python docs/make_names.py --check   only says which pages are out of date; exit code 1 if any is
+
+A table stands between the lines <!-- table: NAME --> and <!-- end -->.
+"""
+
+# ruff: noqa: T201
+from __future__ import annotations
+
+import re
+import sys
+from collections import Counter
+from math import isfinite
+from pathlib import Path
+
+DOCS = Path(__file__).parent
+_MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def vocabulary() -> list[list[str]]:
+    """names.md: the standard names."""
+    from codriver.names import VOCABULARY
+
+    rows = [["name", "symbol", "unit", "shown in", "plausible, SI", "held, s", "meaning and sign"]]
+    for q in VOCABULARY.values():
+        bounds = f"{q.low:g} to {q.high:g}" if isfinite(q.low) or isfinite(q.high) else ""
+        rows.append([f"`{q.name}`", q.symbol, q.unit, q.display, bounds, f"{q.hold:g}" if isfinite(q.hold) else "any", q.meaning])
+    return rows
+
+
+def parameters() -> list[list[str]]:
+    """vehicles.md: what a vehicle file may hold."""
+    from codriver.observers import ESTIMATORS
+    from codriver.vehicles.load import KNOWN
+
+    rows = [["parameter", "SI unit", "bounds, SI", "one per gear", "needed by", "meaning"]]
+    for name, known in KNOWN.items():
+        users = ", ".join(e.name for e in ESTIMATORS.values() if name in e.parameters)
+        gears = "yes" if known.per_gear else ""
+        rows.append([f"`{name}`", known.unit, f"{known.low:g} to {known.high:g}", gears, users, known.meaning])
+    return rows
+
+
+def operations() -> list[list[str]]:
+    """c-export.md: what one step costs, all outputs kept."""
+    import codriver as cd
+    from codriver.observers import ESTIMATORS
+
+    head = ["estimator", "form", "operations", "+ -", "*", "/", "sqrt", "compare, select, logic", "state"]
+    car, rows = cd.load_vehicle("bisoffi2017"), []
+    for name in ESTIMATORS:
+        for form in ("kalman", "constant"):
+            step = cd.build(name, car, form=form).record()
+            kinds = Counter(i.kind for i in step.instructions)
+            groups = (("add", "sub", "neg", "twice"), ("mul", "square"), ("div", "inverse"), ("sqrt",))
+            counts = [sum(kinds[kind] for kind in group) for group in groups]
+            rest = step.operations() - sum(counts)
+            label = form if name != "pedals-only" else "-"
+            rows.append([f"`{name}`", label, *(str(n) for n in (step.operations(), *counts, rest, len(step.carry)))])
+    return [head, *(row for k, row in enumerate(rows) if row not in rows[:k])]
+
+
+_TABLES = {"vocabulary": vocabulary, "parameters": parameters, "operations": operations}
+
+
+def filled(text: str) -> str:
+    """A page with its tables made anew."""
+
+    def table(match: re.Match[str]) -> str:
+        head, *rows = _TABLES[match[2]]()
+        lines = ["| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows)]
+        return match[1] + "\n".join(lines) + "\n" + match[3]
+
+    return _MARKED.sub(table, text)
+
+
+def main(check: bool) -> int:
+    """Rewrite the pages, or only look."""
+    stale = 0
+    for page in sorted(DOCS.glob("*.md")):
+        old = page.read_text(encoding="utf-8")
+        new = filled(old)
+        if new != old:
+            stale += 1
+            print(f"{page.name} {'is out of date: run python docs/make_names.py' if check else 'rewritten'}")
+            if not check:
+                page.write_text(new, encoding="utf-8")
+    return int(check and stale > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main("--check" in sys.argv))
