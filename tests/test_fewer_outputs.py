@@ -41,3 +41,11 @@ def test_saved_state_is_that_of_the_outputs():
     few.restore(few.save())
     with pytest.raises(cd.CodriverError, match="outputs"):
         everything.restore(few.save())
+
+
+def test_two_divisions_update_the_covariance():
+    """Counted, not timed: one division a row, whatever the recorder makes of the algebra."""
+    observer = cd.build("kinematic")
+    estimates = [o.name for o in observer.outputs if o.role == "estimate"]
+    kinds = [i.kind for i in cd.compile(observer, estimates).recorded.instructions]
+    assert sum(kind in ("div", "inverse") for kind in kinds) == 2

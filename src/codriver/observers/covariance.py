@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from codriver.kernel import Scalar, select
+from codriver.kernel import Scalar
 from codriver.signals.signal import Array
 
 Matrix = list[list[Scalar]]
@@ -32,7 +32,7 @@ def predict_covariance(P: Matrix, F: Array, Q: Array) -> Matrix:
 def update_row(
     x: Sequence[Scalar], P: Matrix, h: Sequence[float], innovation: Scalar, R: Scalar, ok: Scalar
 ) -> tuple[list[Scalar], Matrix, Scalar]:
-    """Update with one measured row where ok is not 0; without it, nothing changes.
+    """Update with one measured row where ok is 1; without it, nothing changes.
 
         s = h P h' + R,  k = P h' / s,  x + k e,  P - k s k'
 
@@ -41,7 +41,7 @@ def update_row(
         h: the row of C, numbers.
         innovation: e = y - h x - d u; 0 where the row is missing.
         R: noise variance of the row.
-        ok: 1 where the row is there.
+        ok: 1 where the row is there, else 0.
 
     Returns:
         x, P, and the innovation variance s.
@@ -49,7 +49,8 @@ def update_row(
     n = len(x)
     Ph = [_dot([(h[k], P[i][k]) for k in range(n)]) for i in range(n)]
     s = _dot([(h[k], Ph[k]) for k in range(n)]) + R
-    weight = select(ok, 1.0 / s, 0.0)
+    # One division; s is positive. Written as a choice between 1 / s and 0, CasADi would divide every product by s.
+    weight = ok / s
     step = weight * innovation
     return (
         [x[i] + Ph[i] * step for i in range(n)],
