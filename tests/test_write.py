@@ -83,7 +83,7 @@ def test_places_that_cannot_be_written(tmp_path: Path) -> None:
     for path, says in (
         (tmp_path / "out.xlsx", "no format to write"),
         (tmp_path / "none" / "out.csv", "does not exist"),
-        (tmp_path, "no format"),
+        (tmp_path, "is a folder"),
     ):
         with pytest.raises(errors.UsageError, match=says):
             check_output(path)

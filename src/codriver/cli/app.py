@@ -49,20 +49,22 @@ def _root(
 
 def main() -> None:
     """Run the command line; errors of the data become a message and an exit code, never a traceback."""
-    # `kill` ends a program before it can clear up; as an exception it passes all the clearing up.
-    before = signal.signal(signal.SIGTERM, _terminated)
+    # `kill` ends a program before it can clear up, and typer swallows Ctrl-C; as an exception of our own both pass all
+    # the clearing up and reach us.
+    before = {number: signal.signal(number, _end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         _run()
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
-class _Terminated(BaseException):
-    """The program was told to end."""
+class _Ended(BaseException):
+    """The program was told to end by a signal of this number."""
 
 
-def _terminated(number: int, frame: FrameType | None) -> None:
-    raise _Terminated
+def _end(number: int, frame: FrameType | None) -> None:
+    raise _Ended(number)
 
 
 def _run() -> None:
@@ -74,12 +76,11 @@ def _run() -> None:
             f"codriver: {_printable(str(error))}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None
         )
         raise SystemExit(error.exit_code) from None
-    except KeyboardInterrupt:
-        typer.echo("codriver: interrupted; no result was written", err=True)
-        raise SystemExit(130) from None
-    except _Terminated:
-        typer.echo("codriver: terminated; no result was written", err=True)
-        raise SystemExit(143) from None
+    except _Ended as end:
+        number = int(end.args[0])
+        said = "interrupted" if number == signal.SIGINT else "terminated"
+        typer.echo(f"codriver: {said}; no result was written", err=True)
+        raise SystemExit(128 + number) from None
     except BrokenPipeError:
         raise SystemExit(0) from None
     except MemoryError:

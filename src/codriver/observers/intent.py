@@ -18,7 +18,7 @@ from codriver.observers import known_input
 from codriver.observers.jerk import jerk_observer
 from codriver.observers.observer import Observer, Output, chain
 from codriver.observers.pedals_only import pedals_only
-from codriver.observers.scaled_gain import PRESETS, Preset, design_scaled_gain
+from codriver.observers.scaled_gain import PRESETS, Preset, check_tick, design_scaled_gain
 from codriver.vehicles import Vehicle
 
 _SPEED = Output("longitudinal_speed", "m/s", "estimate", "v")
@@ -127,6 +127,7 @@ def build(
         DesignError: the design fails its certificate.
     """
     estimator = get_estimator(name)
+    check_tick(dt)
     if form not in ("kalman", "constant"):
         raise UsageError(f"form '{form}'", "'kalman' or 'constant'", "choose one")
     if estimator.parameters and vehicle is None:

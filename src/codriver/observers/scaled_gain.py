@@ -100,9 +100,7 @@ def design_scaled_gain(preset: Preset | str, dt: float, ell: float | None = None
     if not ELL_RANGE[0] <= ell <= ELL_RANGE[1]:
         bounds = f"{ELL_RANGE[0]:g} to {ELL_RANGE[1]:g}"
         raise UsageError(f"ell = {ell:g}", f"a number from {bounds}", "start from 2; the papers use 0.8 to 3")
-    if not DT_RANGE[0] <= dt <= DT_RANGE[1]:
-        bounds = f"{DT_RANGE[0]:g} to {DT_RANGE[1]:g} s"
-        raise UsageError(f"dt = {dt:g} s", f"a tick of {bounds}", "choose the sensors' tick, such as 0.01 s")
+    check_tick(dt)
     from scipy.linalg import solve_continuous_are, solve_discrete_are
 
     model = intention_model()
@@ -119,6 +117,17 @@ def design_scaled_gain(preset: Preset | str, dt: float, ell: float | None = None
     left = np.eye(4) - K @ C
     P = left @ predicted @ left.T + K @ Rd @ K.T  # Joseph's form keeps it positive definite
     return ScaledGain(ell, dt, L_K, L, Q, R, F, Qd, Rd, K, P, predicted, _certify(A, C, F, L_K, L, K, ell, dt))
+
+
+def check_tick(dt: float) -> None:
+    """Whether a tick can be designed for.
+
+    Raises:
+        UsageError: it is out of range.
+    """
+    if not DT_RANGE[0] <= dt <= DT_RANGE[1]:
+        bounds = f"{DT_RANGE[0]:g} to {DT_RANGE[1]:g} s"
+        raise UsageError(f"dt = {dt:g} s", f"a tick of {bounds}", "choose the sensors' tick, such as 0.01 s")
 
 
 def _certify(A: Array, C: Array, F: Array, L_K: Array, L: Array, K: Array, ell: float, dt: float) -> Certificate:
