@@ -125,6 +125,7 @@ def _libraries(form: str, program: Program, grid: Grid, ours: Timing) -> Iterato
         yield _against_statsmodels(program, grid, ours)
         yield _scaled(title, "numpy loop", program, grid, ours, 20_000, others.numpy_kalman(design))
     else:
+        yield _scaled(title, "filterpy, steady", program, grid, ours, 20_000, others.filterpy_steady(design))
         yield _scaled(title, "scipy dlsim", program, grid, ours, 100_000, others.scipy_dlsim(design))
         yield _scaled(title, "numpy loop", program, grid, ours, 20_000, others.numpy_constant(design))
 

@@ -41,6 +41,25 @@ def filterpy_filter(design: ScaledGain) -> Work:
     return work
 
 
+def filterpy_steady(design: ScaledGain) -> Work:
+    """filterpy's KalmanFilter with the gain held, predict_steadystate and update_steadystate a sample."""
+    from filterpy.kalman import KalmanFilter
+
+    def work(y: np.ndarray) -> np.ndarray:
+        kf = KalmanFilter(dim_x=4, dim_z=2)
+        kf.F, kf.H, kf.K = design.F, intention_model().C, design.K
+        kf.x = _start(design, y)[0].reshape(4, 1)
+        out = np.empty((len(y), 4))
+        for k in range(len(y)):
+            if k:
+                kf.predict_steadystate()
+            kf.update_steadystate(y[k].reshape(2, 1))
+            out[k] = kf.x[:, 0]
+        return out
+
+    return work
+
+
 def statsmodels_filter(design: ScaledGain) -> Work:
     """statsmodels' compiled Kalman filter; single rows may be missing."""
     from statsmodels.tsa.statespace.kalman_filter import MEMORY_NO_SMOOTHING, KalmanFilter

@@ -30,8 +30,7 @@ LIMITS = """## What limits the rest
 
 * The loop of the constant form waits for its own last state: prediction, innovation, gain, and the selections for start and
   standstill follow one another, so a wider machine does not help and `-march=native` adds little to C either.
-* The Kalman form adds two divisions that follow one another (each row's 1 / s), a third of its time, and four times the
-  arithmetic.
+* The Kalman form has three times the arithmetic, and two divisions that wait for one another (each row's 1 / s).
 * All outputs instead of the four estimates: the noise scale with its divisions and roots, and a store a column; with fresh
   arrays the system's clearing of new pages comes on top. `compile(observer, outputs=[...])` leaves out what is not asked for.
 * From BLF to Parquet, half of the time is unpacking and finding the frames; a cold start is imports (scipy, numpy, typer,
