@@ -31,7 +31,7 @@ def demo(
     if out.exists() and not out.is_dir():
         raise UsageError(f"--out {out} is a file", "a folder, or a name that is free", "choose another --out")
     screen = console()
-    with working(True) as stage:
+    with working(True, 1) as stage:
         stage("simulating three minutes of driving")
         files = write_demo(out, seed)
     result, report = out / "estimate.parquet", out / "report.html"

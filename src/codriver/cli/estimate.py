@@ -70,16 +70,15 @@ def estimate_log(
     if rate is not None and not 1 <= rate <= 10000:
         raise UsageError(f"--rate {rate:g}", "1 to 10000 Hz", "choose a rate near the accelerometer's, such as 100")
     vehicle = load_vehicle(vehicle_name) if vehicle_name is not None else None
-    with working(not as_json) as stage:
+    with working(not as_json, 3) as stage:
         stage(f"reading {path.name}")
         recorded = read(path, dbc=dbc, names=names, bus=bus)
         name, why = _choose(estimator, recorded, vehicle)
         stage(f"estimating: {name}")
         result = run_estimator(name, recorded, vehicle, ell=ell, rate=rate, preset=preset, form=form)
         _refuse_empty(result)
-        stage(f"writing {out.name}")
-        command = command_line()
-        _write(result, out, report, command, truth, stage)
+        stage(f"writing {out.name}" + (f" and {report.name}" if report is not None else ""))
+        _write(result, out, report, command_line(), truth)
     summary = summarise(result, str(out), str(report) if report is not None else None, why)
     if as_json:
         typer.echo(json_module.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False))
@@ -162,7 +161,7 @@ def run_estimator(
     return compile(observer).run(log)
 
 
-def _write(result: Estimate, out: Path, report: Path | None, command: str, truth: Log | None, stage: object) -> None:
+def _write(result: Estimate, out: Path, report: Path | None, command: str, truth: Log | None) -> None:
     """Write result and report: both or neither."""
     from codriver.estimate_file import save_estimate
 

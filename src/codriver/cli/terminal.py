@@ -20,18 +20,18 @@ def command_line() -> str:
 
 
 @contextmanager
-def working(show: bool) -> Iterator[Callable[[str], None]]:
-    """A spinner with the present stage, on standard error; call what it gives with each stage's name."""
+def working(show: bool, stages: int) -> Iterator[Callable[[str], None]]:
+    """A bar of so many stages, on standard error; call what it gives with each stage's name as the stage begins."""
     if not show or not sys.stderr.isatty():
         yield lambda text: None
         return
     from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    columns = SpinnerColumn(), BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("")
-        yield lambda text: progress.update(task, description=text)
+        task = progress.add_task("", total=stages, completed=-1)
+        yield lambda text: progress.update(task, description=text, advance=1)
 
 
 def console() -> Console:
