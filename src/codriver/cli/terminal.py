@@ -30,8 +30,8 @@ def working(show: bool, stages: int) -> Iterator[Callable[[str], None]]:
 
     columns = SpinnerColumn(), BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("", total=stages, completed=-1)
-        yield lambda text: progress.update(task, description=text, advance=1)
+        task = progress.add_task("", total=stages, completed=-1, visible=False)
+        yield lambda text: progress.update(task, description=text, advance=1, visible=True)
 
 
 def console() -> Console:
