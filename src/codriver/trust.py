@@ -103,6 +103,10 @@ def check_estimate(
     for row in ("acceleration", "speed"):
         if f"{row}_innovation" in values:
             findings += _row(row, values, valid, grid, horizon, nis, lean)
+    if not measured:
+        findings.append(Finding(
+            "warn", "nothing measured is held against it, so a wrong parameter or unit would not show here; compare with kinematic",
+        ))  # fmt: skip
     if {"longitudinal_acceleration", "longitudinal_speed"} <= set(measured):
         findings += _sensors_agree(log)
     if "acceleration_offset" in values and valid.any():
