@@ -26,7 +26,17 @@ def vocabulary() -> list[list[str]]:
     rows = [["name", "symbol", "unit", "shown in", "plausible, SI", "held, s", "meaning and sign"]]
     for q in VOCABULARY.values():
         bounds = f"{q.low:g} to {q.high:g}" if isfinite(q.low) or isfinite(q.high) else ""
-        rows.append([f"`{q.name}`", q.symbol, q.unit, q.display, bounds, f"{q.hold:g}" if isfinite(q.hold) else "any", q.meaning])
+        rows.append(
+            [
+                f"`{q.name}`",
+                q.symbol,
+                q.unit,
+                q.display,
+                bounds,
+                f"{q.hold:g}" if isfinite(q.hold) else "any",
+                q.meaning,
+            ]
+        )
     return rows
 
 

@@ -1,6 +1,6 @@
 """Figures of docs/bit-contract.md and docs/c-export.md: operations, compile times, error of the float export.
 
-    python docs/measure/arithmetic.py            needs gcc for the float errors
+python docs/measure/arithmetic.py            needs gcc for the float errors
 """
 
 # ruff: noqa: T201
@@ -20,7 +20,12 @@ from codriver.kernel.llvm import compile_loop
 from codriver.observers import ESTIMATORS
 
 CAR = cd.load_vehicle("bisoffi2017")
-CASES = [(name, form) for name in ESTIMATORS for form in ("kalman", "constant") if (name, form) != ("pedals-only", "constant")]
+CASES = [
+    (name, form)
+    for name in ESTIMATORS
+    for form in ("kalman", "constant")
+    if (name, form) != ("pedals-only", "constant")
+]
 JERK = {name: "longitudinal_jerk" if name == "kinematic" else "intentional_jerk" for name in ESTIMATORS}
 
 

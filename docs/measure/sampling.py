@@ -61,7 +61,9 @@ def holes(log: cd.Log) -> dict[str, cd.Estimate]:
     newest = np.maximum.accumulate(np.where(kept, np.arange(kept.size), 0))
     holding = log.with_signals(cd.Signal(V, speed.time, speed.values[newest], ""))
     stamps = gappy[A].time
-    near = np.abs(gappy[V].time[np.clip(np.searchsorted(gappy[V].time, stamps - 1e-6), 0, kept.sum() - 1)] - stamps) < 1e-6
+    near = (
+        np.abs(gappy[V].time[np.clip(np.searchsorted(gappy[V].time, stamps - 1e-6), 0, kept.sum() - 1)] - stamps) < 1e-6
+    )
     rows = gappy.with_signals(cd.Signal(A, stamps[near], gappy[A].values[near], ""))
     return {
         "no gaps, Kalman form": jerk(log), "no gaps, constant form": jerk(log, form="constant"),
@@ -85,7 +87,9 @@ def main() -> None:
             return rms((a["longitudinal_jerk"].values - b["longitudinal_jerk"].values)[b.valid])
 
         for rate in rates:
-            found["rate", "{} / {}".format(*rate)].append([scatter((clock(rate[0]), clock(rate[1])), form=f) for f in FORMS])
+            found["rate", "{} / {}".format(*rate)].append(
+                [scatter((clock(rate[0]), clock(rate[1])), form=f) for f in FORMS]
+            )
         for dt, *rate in ticks:
             found["tick", f"{1 / dt:g} | {rate[0]} / {rate[1]}"].append([scatter((clock(rate[0]), clock(rate[1])), dt)])
         even = clock(100), clock(50)
@@ -101,10 +105,16 @@ def main() -> None:
             same = bests["constant" if "constant" in name else "kalman"]
             off = e["longitudinal_jerk"].values - same["longitudinal_jerk"].values
             trusted = best.valid & e.valid
-            found["holes", name].append([rms(off[best.valid]), rms(off[near]), rms(off[trusted]), trusted.sum() / best.valid.sum()])
-    delays = {("rate", "{} / {}".format(*r)): [lag(clock(r[0], 60), clock(r[1], 60), 0.01, f) for f in FORMS] for r in rates}
+            found["holes", name].append(
+                [rms(off[best.valid]), rms(off[near]), rms(off[trusted]), trusted.sum() / best.valid.sum()]
+            )
+    delays = {
+        ("rate", "{} / {}".format(*r)): [lag(clock(r[0], 60), clock(r[1], 60), 0.01, f) for f in FORMS] for r in rates
+    }
     delays |= {("tick", f"{1 / t:g} | {a} / {v}"): [lag(clock(a, 60), clock(v, 60), t)] for t, a, v in ticks}
-    print(f"`kinematic`, mean of {len(SEEDS)} drives, ell = {ELL:g}; delay in s, scatter and error of the jerk in m/s^3 rms")
+    print(
+        f"`kinematic`, mean of {len(SEEDS)} drives, ell = {ELL:g}; delay in s, scatter and error of the jerk in m/s^3 rms"
+    )
     heads = {
         "rate": ["accelerometer / speed, Hz", "delay, Kalman", "delay, constant", "scatter, Kalman", "scatter, constant"],
         "tick": ["tick, Hz", "accelerometer / speed, Hz", "delay", "scatter"], "jitter": ["jitter", "error"],

@@ -36,7 +36,9 @@ def main() -> None:
     for name, parameters in CHANGES.items():
         right = [cd.compile(cd.build(name, car)).run(d.log) for d in logs]
         ideal = [ideal_jerk(d, e) if name != "pedals-only" else None for d, e in zip(logs, right, strict=True)]
-        error = [rms((e["intentional_jerk"].values - i)[e.valid]) for e, i in zip(right, ideal, strict=True) if i is not None]
+        error = [
+            rms((e["intentional_jerk"].values - i)[e.valid]) for e, i in zip(right, ideal, strict=True) if i is not None
+        ]
         rows.append([name, "none", "0", f"{np.mean(error):.4f}" if error else "-"])
         for parameter in parameters:
             program = cd.compile(cd.build(name, changed(car, parameter)))
@@ -47,8 +49,14 @@ def main() -> None:
                 share.append(rms(a - b) / rms(a))
                 if i is not None:
                     error.append(rms(b - i[e.valid]))
-            rows.append([name, f"{parameter} +5 %", f"{100 * np.mean(share):.2f} %", f"{np.mean(error):.4f}" if error else "-"])
-    print(table(["estimator", "wrong", "change of the jerk, rms over rms", "error against the model's truth, m/s^3"], rows))
+            rows.append(
+                [name, f"{parameter} +5 %", f"{100 * np.mean(share):.2f} %", f"{np.mean(error):.4f}" if error else "-"]
+            )
+    print(
+        table(
+            ["estimator", "wrong", "change of the jerk, rms over rms", "error against the model's truth, m/s^3"], rows
+        )
+    )
 
 
 if __name__ == "__main__":

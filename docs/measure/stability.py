@@ -35,7 +35,9 @@ def main() -> None:
                 speed = next(n for n in count(2) if growth(preset, ell, dt, 1, n) >= 1)
                 both = next(n for n in count(2) if growth(preset, ell, dt, n, n) >= 1)
                 rows.append([preset, f"{ell:g}", f"{dt:g}", str(speed), str(both)])
-    print(table(["preset", "ell", "tick, s", "speed on every n-th tick: unstable from n", "both: unstable from n"], rows))
+    print(
+        table(["preset", "ell", "tick, s", "speed on every n-th tick: unstable from n", "both: unstable from n"], rows)
+    )
 
 
 if __name__ == "__main__":

@@ -55,7 +55,9 @@ def noisy_pedals(seeds: range) -> None:
         valid = programs["intent-pedals, ell 2"].run(log, start=0.0, stop=DURATION - 0.1).valid
         for name, program in programs.items():
             jerk = program.run(log, start=0.0, stop=DURATION - 0.1)["intentional_jerk"]
-            found[name].append((*lead(jerk.values, onto(truth, "planned_jerk", jerk.time), valid, 0.01), rms(jerk.values)))
+            found[name].append(
+                (*lead(jerk.values, onto(truth, "planned_jerk", jerk.time), valid, 0.01), rms(jerk.values))
+            )
     rows = [[name, *(f"{x:.2f}" for x in np.mean(f, axis=0))] for name, f in found.items()]
     print("\nwith noisy pedals")
     print(table(["estimator", "correlation with the plan", "at lag, s", "rms of the estimate, m/s^3"], rows))

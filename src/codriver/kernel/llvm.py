@@ -8,7 +8,7 @@ with one column a pointer: inputs are double columns, or byte columns for flags;
 in registers inside the loop. With n = 1 the same code is the live step, so batch and live cannot differ. No fast-math
 flag is set, so LLVM neither reorders nor fuses: results have the bits that the operations as written have.
 
-A trial with numba on the same list took seconds to compile; this takes tenths (docs/bit-contract.md has the figures).
+numba takes seconds to compile the same list, this less than a tenth (docs/bit-contract.md has the figures).
 """
 
 from __future__ import annotations

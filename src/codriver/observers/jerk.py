@@ -5,6 +5,7 @@
 
 Kalman form: P is carried and K follows from it, so rows at different rates and holes are exact. Constant form: K is the
 stationary gain (the papers'), a row that is missing brings no correction. When nothing is missing, both are the same.
+(Where rows are missing most of the time, the constant form is not stable: docs/sampling.md.)
 The known input is taken straight between ticks.
 
 Outside the model:
