@@ -3,7 +3,7 @@
 codriver keeps no cache of its own, so what a first run can lack is Python's bytecode. pip compiles it as it installs, so
 after `pip install` nothing is left to do; installers that leave it to the first run make that run compile every module it
 imports, which the last row shows with an empty cache. cantools imports python-can, which imports asammdf where it is
-installed, and that pandas and more; a plain install lacks it, so it is hidden from those runs. The machine's file
+installed, and that pandas and more; a plain install lacks both, so they are hidden from those runs. The machine's file
 cache is warm throughout.
 """
 
@@ -21,8 +21,14 @@ from pathlib import Path
 from car_log import CarLog, write_car_log
 from measure import Row, duration, say
 
+_PROGRAM = """
+import sys
+sys.modules["asammdf"] = sys.modules["pandas"] = None
+from codriver.cli import main
+main()
+"""
 CODRIVER = [str(Path(sys.executable).with_name("codriver"))]
-PLAIN = [sys.executable, "-c", "import sys; sys.modules['asammdf'] = None; from codriver.cli import main; main()"]
+PLAIN = [sys.executable, "-c", _PROGRAM]
 
 
 def run(quick: bool = False) -> Iterator[Row]:
@@ -36,7 +42,7 @@ def run(quick: bool = False) -> Iterator[Row]:
         command = estimate_command(log, "kinematic" if quick else "intent-pedals", folder / "out.parquet")
         text = f"codriver estimate, {log.seconds:g} s log of {log.frames} frames"
         times = 1 if quick else 5
-        yield _timed(f"{text}, asammdf there", command, 4, times)
+        yield _timed(f"{text}, asammdf and pandas there", command, 4, times)
         yield _timed(f"{text}, plain install", command, 4, times, "bytecode there, as after pip install", program=PLAIN)
         empty = {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPYCACHEPREFIX": str(folder / "nothing")}
         note = "every module that is imported is compiled anew"

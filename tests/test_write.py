@@ -1,6 +1,8 @@
 """Writers: what is written is read back, and nothing half-written stays."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -119,3 +121,14 @@ def test_failure_leaves_nothing_and_keeps_the_old_file(tmp_path: Path) -> None:
     with pytest.raises((errors.CodriverError, TypeError, ValueError)):
         write_table(path, TIME, [Column("x", np.array([object()] * 200))])
     assert [p.name for p in tmp_path.iterdir()] == ["out.csv"]
+
+
+def test_pandas_is_not_woken(tmp_path):
+    """Arrow imports pandas for nothing unless it is given bytes; half a second of every first estimate."""
+    program = (
+        "import sys, numpy as np; from codriver.logs.write import Column, write_table; "
+        "values = np.array([1.0, np.nan, 3.0]); flags = np.array([True, False, True]); "
+        f"write_table({str(tmp_path / 'a.parquet')!r}, np.arange(3.0), [Column('x', values), Column('f', flags)]); "
+        "sys.exit('pandas' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

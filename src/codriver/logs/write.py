@@ -142,14 +142,36 @@ def _table(time: Array, columns: Sequence[Column], metadata: Mapping[str, str]) 
     import pyarrow as pa
 
     fields = [pa.field("time", pa.float64(), metadata={"unit": "s"})]
-    arrays = [pa.array(time)]
+    arrays = [_arrow(time)]
     for column in columns:
-        values = np.asarray(column.values)
-        array = pa.array(values, from_pandas=True)
+        array = _arrow(np.asarray(column.values))
         notes = {key: text for key, text in (("unit", column.unit), ("comment", column.comment)) if text}
         fields.append(pa.field(column.name, array.type, metadata=notes or None))
         arrays.append(array)
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=dict(metadata) or None))
+
+
+def _arrow(values: npt.NDArray[Any]) -> pa.Array:
+    """Numbers or booleans as an Arrow array; NaN becomes null.
+
+    Made from the bytes where it can be: pa.array imports pandas wherever that is installed, which costs half a second.
+    """
+    import pyarrow as pa
+
+    if values.dtype == np.bool_:
+        return pa.Array.from_buffers(pa.bool_(), values.size, [None, _bits(values)])
+    if values.dtype != np.float64:
+        return pa.array(values, from_pandas=True)
+    there = ~np.isnan(values)
+    data = pa.py_buffer(np.ascontiguousarray(values))
+    return pa.Array.from_buffers(pa.float64(), values.size, [None if there.all() else _bits(there), data])
+
+
+def _bits(flags: npt.NDArray[np.bool_]) -> pa.Buffer:
+    """Booleans as Arrow packs them."""
+    import pyarrow as pa
+
+    return pa.py_buffer(np.packbits(flags, bitorder="little"))
 
 
 def _write_parquet(path: Path, time: Array, columns: Sequence[Column], metadata: Mapping[str, str]) -> None:
