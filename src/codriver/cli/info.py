@@ -123,8 +123,10 @@ def _show(summary: dict[str, Any]) -> None:
     elif summary["best_with_a_vehicle"]:
         out.print(f"\nbest available with a vehicle file: [bold]{summary['best_with_a_vehicle']}[/]")
     else:
+        least = next(e for e in summary["estimators"] if e["name"] == "kinematic")
         out.print(
-            "\nno estimator can be fed: kinematic, the least, needs longitudinal_acceleration and longitudinal_speed"
+            "\nno estimator can be fed: kinematic, which needs the least, lacks "
+            + " and ".join(least["missing_signals"])
         )
 
 
@@ -133,9 +135,9 @@ def _example(channels: list[dict[str, str]]) -> str:
     likely = [c for c in channels if "speed" in c["name"].lower() and "engine" not in c["name"].lower()]
     vehicle = [c for c in likely if "vehicle" in c["name"].lower()]
     chosen = next(iter([*vehicle, *likely, *channels]), {"name": "Message.Signal", "unit": ""})
-    unit = chosen["unit"] or "km/h"
+    unit, doubt = chosen["unit"] or "km/h", "" if chosen["unit"] else "  # the recording says none: which is it?"
     source = json_module.dumps(chosen["name"], ensure_ascii=False)
     return (
         "it begins like this (docs/names.md has the standard names):\n\n"
-        f"  [longitudinal_speed]\n  source = {source}\n  unit = {json_module.dumps(unit, ensure_ascii=False)}\n"
+        f"  [longitudinal_speed]\n  source = {source}\n  unit = {json_module.dumps(unit, ensure_ascii=False)}{doubt}\n"
     )

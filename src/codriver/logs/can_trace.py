@@ -73,7 +73,7 @@ def _recording(
         raise FormatError(
             f"{path} holds no CAN data frames" + "".join(f"; {fault}" for fault in faults),
             f"lines such as '{line}'" if line else f"a {title} with frames",
-            "check that the suffix fits the format, and that the recording was made on a running bus",
+            "check that the suffix fits the format (a table must end in .csv), and that the recording was made on a running bus",
         )
     return CanRecording(str(path), title, frames, options.dbc, options.bus, faults)
 
