@@ -525,16 +525,17 @@ class TestCanTraces:
 
 
 class TestEmpty:
-    @pytest.mark.parametrize(
-        "name",
-        ["a.blf", "a.asc", "a.trc", "a.log", "a.mf4", "a.mdf", "a.dat", "a.csv", "a.tsv", "a.txt", "a.csv.gz",
-         "a.blf.gz", "a.asc.gz", "a.log.gz", "a.trc.gz", "a.parquet", "a.pq", "a.json", "a_pose.json", "a.ibt"],
+    SUFFIXES = (
+        "a.blf", "a.asc", "a.trc", "a.log", "a.mf4", "a.mdf", "a.dat", "a.csv", "a.tsv", "a.txt", "a.csv.gz", "a.blf.gz",
+        "a.asc.gz", "a.log.gz", "a.trc.gz", "a.parquet", "a.pq", "a.json", "a_pose.json", "a.ibt",
     )  # fmt: skip
-    @pytest.mark.parametrize("zipped", [False, True])
-    def test_empty_file(self, run, estimate, demo_files, tmp_path, name, zipped):
-        if zipped and not name.endswith(".gz"):
-            pytest.skip("not compressed")
-        (tmp_path / name).write_bytes(gzip.compress(b"") if zipped else b"")
+
+    @pytest.mark.parametrize(
+        ("name", "content"),
+        [(name, b"") for name in SUFFIXES] + [(name, gzip.compress(b"")) for name in SUFFIXES if name.endswith(".gz")],
+    )
+    def test_empty_file(self, run, estimate, demo_files, tmp_path, name, content):
+        (tmp_path / name).write_bytes(content)
         for ran in (estimate("kinematic", tmp_path / name, "--dbc", demo_files.dbc), run("info", tmp_path / name)):
             assert ran.code == 1
             ran.says(name)

@@ -150,7 +150,9 @@ def _driver(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Gri
 
 def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid) -> Finding:
     """How much of the drive is valid, and why the rest is not."""
-    share = float(valid.mean()) if valid.size else 0.0
+    if not valid.size:
+        return Finding("bad", "there is not one tick: the signals do not overlap, or the log is empty")
+    share = float(valid.mean())
     reasons = []
     if "standstill" in values:
         reasons.append(f"standing {np.mean(values['standstill'] > 0.5):.0%}")
@@ -158,7 +160,7 @@ def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: G
         reasons.append(f"inputs missing {np.mean(values['inputs_known'] < 0.5):.0%}")
         if "standstill" in values:
             rest = ~valid & (values["standstill"] < 0.5) & (values["inputs_known"] > 0.5)
-            if rest.any() and rest.mean() > 0.05:
+            if rest.mean() > 0.05:
                 reasons.append(f"slower than 1 m/s, before the first speed or not settled {rest.mean():.0%}")
     text = f"{share:.0%} of {len(grid) * grid.dt:.1f} s is valid" + (f" ({', '.join(reasons)})" if reasons else "")
     return Finding("bad" if share < 0.05 else "warn" if share < 0.5 else "ok", text, _spans(~valid, grid))
