@@ -47,7 +47,7 @@ def main() -> int:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[variable] = "1"  # the benchmarks start numpy, later
     rows: list[Row] = []
-    begun = time.perf_counter()
+    begun, busy = time.perf_counter(), load()
     try:
         for name in (chosen.only,) if chosen.only else NAMES:
             say(f"{name}:")
@@ -60,7 +60,7 @@ def main() -> int:
         return 130
     print(table(rows))
     if not chosen.only and not chosen.quick:
-        RESULTS.write_text(page(rows, time.perf_counter() - begun), encoding="utf-8")
+        RESULTS.write_text(page(rows, time.perf_counter() - begun, busy), encoding="utf-8")
         say(f"wrote {RESULTS.name}")
     return 0
 
@@ -89,7 +89,12 @@ def table(rows: list[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def page(rows: list[Row], seconds: float) -> str:
+def load() -> float:
+    """How many programs run, on average of the last minute."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+
+
+def page(rows: list[Row], seconds: float, busy: float) -> str:
     """RESULTS.md."""
     return f"""# Benchmarks
 
@@ -97,7 +102,8 @@ Written by `python benchmarks/run.py` on {date.today().isoformat()}, in one run 
 thread. Times are the best of several; in brackets, how much longer the longest took. A ratio is the alternative's time by
 ours. A loop "alone" is timed on arrays that are there already, for us and for C.
 
-{machine()}
+{machine()}* other programs running: {busy:.1f} when it began; above about 0.5 the times are worth less
+
 {table(rows)}
 {LIMITS}"""
 
