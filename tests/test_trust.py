@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 import codriver as cd
+from codriver.errors import MissingSignal
+from codriver.observers import Output
 from codriver.simulate import demo_drive, truth_log
 from conftest import motion_log
+from toy_wheel import OUTPUTS, toy_wheel, wheel_log
 
 
 def kinematic(log, **options):
@@ -75,6 +78,103 @@ def test_standing_all_the_time():
     check = kinematic(log).check()
     assert check.valid_share == 0
     assert not check.trusted
+
+
+class TestForeignObserver:
+    """Rows are found by their role, whatever they are called."""
+
+    def test_sound(self):
+        check = cd.compile(toy_wheel()).run(wheel_log()).check()
+        assert list(check.nis) == list(check.lean) == ["angle"]
+        assert 0.5 < check.nis["angle"] < 1.5
+        assert check.valid_share == 1.0
+        assert check.verdict == "nothing speaks against it"
+        assert "(1 is right" in found(check, "ok")
+
+    def test_innovations_far_outside_their_band(self):
+        check = cd.compile(toy_wheel(innovation_sd=1e-6)).run(wheel_log()).check()
+        assert not check.trusted
+        assert "angle: the innovations scatter" in found(check, "bad")
+        assert "ell" not in found(check, "bad")  # it has no such knob
+        assert "slip" not in found(check, "warn")
+
+    def test_much_too_wide_a_band_is_no_praise(self):
+        check = cd.compile(toy_wheel(innovation_sd=1.0)).run(wheel_log()).check()
+        assert "the band is wide for this sensor" in found(check, "ok")
+        assert "is right" not in found(check, "ok")
+
+    @pytest.mark.parametrize("sd", [0.0, -1.0, float("nan")])
+    def test_a_standard_deviation_that_is_none(self, sd):
+        check = cd.compile(toy_wheel(innovation_sd=sd)).run(wheel_log()).check()
+        assert "not above 0" in found(check, "bad")
+        assert not check.nis
+
+    def test_no_standard_deviation(self):
+        check = cd.compile(toy_wheel(outputs=OUTPUTS[:5])).run(wheel_log()).check()
+        assert "no standard deviation of its innovations" in found(check, "warn")
+
+    def test_no_innovations(self):
+        check = cd.compile(toy_wheel(outputs=OUTPUTS[:2])).run(wheel_log()).check()
+        assert "cannot be judged: no innovations among the outputs" in found(check, "warn")
+
+    def test_used_says_which_count(self):
+        used = Output("angle_used", "1", "flag")
+        late = toy_wheel(innovation_sd=1.0, outputs=(*OUTPUTS, used))
+        step = late.step
+
+        def never(carry, u, y, ok, rho):
+            new, out = step(carry, u, y, ok, rho)
+            return new, {**out, "angle_used": 0.0}
+
+        check = cd.compile(toy_wheel(step=never, outputs=(*OUTPUTS, used))).run(wheel_log()).check()
+        assert "only 0 valid innovations" in found(check, "warn")
+
+    def test_lean_is_taken_over_the_knob(self):
+        """A lean that lasts 2 s shows more over 5 s than over 0.5 s."""
+        log = wheel_log()
+        slow = cd.compile(toy_wheel(settings={"ell": 0.2})).run(log).check()
+        usual = cd.compile(toy_wheel(settings={"ell": "high"})).run(log).check()
+        same = cd.compile(toy_wheel(settings={"ell": 2.0})).run(log).check()
+        assert usual.lean == same.lean != slow.lean
+
+
+class TestFewerOutputs:
+    """What was left out is not judged, and is not taken for granted."""
+
+    def test_estimates_alone(self):
+        log, _ = motion_log(60)
+        program = cd.compile(cd.build("kinematic"), outputs=["longitudinal_jerk"])
+        check = program.run(log).check()
+        assert np.isnan(check.valid_share)
+        assert not check.nis
+        assert "cannot be judged: the flag 'valid' is not among the outputs" in found(check, "warn")
+        assert "valid" not in found(check, "ok")
+        with pytest.raises(MissingSignal, match="left out"):
+            _ = program.run(log).valid
+
+    def test_validity_without_innovations(self):
+        log, _ = motion_log(60)
+        check = cd.compile(cd.build("kinematic"), outputs=["longitudinal_jerk", "valid"]).run(log).check()
+        assert check.valid_share > 0.9
+        assert "cannot be judged: no innovations" in found(check, "warn")
+
+    def test_one_row_of_two(self):
+        log, _ = motion_log(60)
+        names = ["valid", "speed_innovation", "speed_innovation_sd", "speed_used"]
+        check = cd.compile(cd.build("kinematic"), outputs=names).run(log).check()
+        assert list(check.nis) == ["speed"]
+        assert "acceleration: cannot be judged" in found(check, "warn")
+
+    def test_no_flag_at_all_is_valid_always(self):
+        estimate = cd.compile(toy_wheel()).run(wheel_log(2.0))
+        assert estimate.valid.all()
+        assert estimate.valid.shape == estimate.time.shape
+
+    @pytest.mark.parametrize("make", [toy_wheel, lambda: cd.build("kinematic")])
+    def test_not_one_tick(self, make):
+        log = wheel_log(2.0).with_signals(*motion_log(2)[0].values())
+        estimate = cd.compile(make()).run(log, start=5.0, stop=4.0)
+        assert "not one tick" in found(estimate.check(), "bad")
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from codriver.errors import MissingSignal
+from codriver.innovations import Innovations, innovation_rows
 from codriver.observers.observer import Output
 from codriver.signals import Grid, Log, Signal
 from codriver.signals.signal import Array
@@ -25,7 +26,7 @@ class Estimate(Mapping[str, Signal]):
         observer: its name.
         grid: the sampled inputs.
         columns: of the outputs, by name, shape (n,) each.
-        outputs: what they are.
+        outputs: all outputs of the observer; `columns` lacks those left out when it was compiled.
         measured: standard names of the measurements among the inputs.
         provenance: what made it.
         log: the log it was made from.
@@ -65,6 +66,11 @@ class Estimate(Mapping[str, Signal]):
         """The outputs that are estimates of signals."""
         return tuple(o for o in self.outputs if o.role == "estimate" and o.name in self.columns)
 
+    @property
+    def innovations(self) -> list[Innovations]:
+        """The rows of innovations among the outputs."""
+        return innovation_rows(self.columns, self.outputs)
+
     def sd(self, name: str) -> Array | None:
         """Standard deviations of an estimate, shape (n,); None where the estimator gives none."""
         return self.columns.get(f"{name}_sd")
@@ -75,8 +81,21 @@ class Estimate(Mapping[str, Signal]):
 
     @property
     def valid(self) -> npt.NDArray[np.bool_]:
-        """Where the model holds, the inputs are known and the estimate has settled, shape (n,)."""
-        return self.flag("valid")
+        """Where the model holds, the inputs are known and the estimate has settled, shape (n,).
+
+        All True where the observer has no flag `valid`: it claims to be valid always.
+
+        Raises:
+            MissingSignal: the observer has the flag, but it was left out of the outputs.
+        """
+        if "valid" in self.columns:
+            return self.flag("valid")
+        if any(output.name == "valid" for output in self.outputs):
+            raise MissingSignal(
+                f"where {self.observer} is valid is not known: the flag 'valid' was left out of the outputs",
+                "an estimate with it", "add 'valid' to the outputs given to compile()",
+            )  # fmt: skip
+        return np.ones(len(self.grid), bool)
 
     @property
     def faults(self) -> tuple[str, ...]:
@@ -84,9 +103,19 @@ class Estimate(Mapping[str, Signal]):
         return self.log.faults
 
     def check(self) -> Check:
-        """Whether to trust the estimate: what the innovations and the flags say."""
-        horizon = 1.0 / float(self.provenance.get("ell", 2.0))
-        return check_estimate(self.columns, self.grid, self.measured, self.log, horizon)
+        """Whether to trust the estimate: what the innovations and the flags say.
+
+        Outputs that were left out are not judged, and named.
+        """
+        return check_estimate(self.columns, self.outputs, self.grid, self.measured, self.log, self._knob())
+
+    def _knob(self) -> float | None:
+        """The setting ell, where the observer has one that is a number above 0."""
+        try:
+            ell = float(self.provenance["ell"])
+        except (KeyError, ValueError):
+            return None
+        return ell if 0 < ell < float("inf") else None
 
     def _output(self, name: str) -> Output:
         return next(o for o in self.outputs if o.name == name)

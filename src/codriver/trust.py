@@ -4,29 +4,39 @@ A filter whose assumptions hold leaves innovations that are as large as it says 
 looked at, where the estimate is valid:
 
 * share of time that is valid at all;
-* scatter of each row, the mean of e^2 / var(e) (the normalised innovation squared, NIS), and lean, the same of block means
-  over 1/ell seconds: how much the innovations do together. The band is set so that the larger is about 1 over the drive;
-  above 2.25 (1.5 times the band) is a
-  warning, above 6.25 (2.5 times) the band is wrong;
+* scatter and lean of each row of innovations (`innovations.py`), the lean over 1/ell seconds: how much they do together.
+  Both are told as multiples of the band. The bands of our estimators cover the larger of the two in the worst of the last
+  minute, so over a whole sound drive the larger is about 0.5; above 1.5 is a warning, above 2.5 the band is wrong, and
+  where both are below 0.25 the band is wider than this sensor needs;
 * stretches where one of the two is above 16 for at least 1 s: wheel slip, a wrong ratio, a sensor fault;
 * the sensors against each other: accelerometer and change of speed must go together, else a sign or a unit is wrong;
 * the accelerometer offset: more than 3 m/s^2 is no road;
 * brake and known input: a brake that is always pressed, a powertrain that adds more than the vehicle shows;
 * used signals most of whose samples no vehicle can show: a unit or a scale is wrong.
+
+What an observer does not tell is not judged, and what was left out of the outputs (`compile(observer, outputs=...)`) is
+named: without innovations, or without the flag that says where they count, nothing is claimed of the band.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from codriver.innovations import Innovations, blocks, innovation_rows, row_name
+from codriver.observers.observer import Output
 from codriver.signals import Grid, Log
 from codriver.signals.signal import Array
 
-WIDE, WRONG, BAD_STRETCH, STEEP = 2.25, 6.25, 16.0, 3.0
+# Of squares: scatter and lean of 1.5, 2.5, 4 and 0.25 times the band. And m/s^2.
+LARGE, WRONG, BAD_STRETCH, SMALL, STEEP = 2.25, 6.25, 16.0, 0.0625, 3.0
+HORIZON = 0.5  # s over which innovations may lean, where no knob says how quick the observer is
+FEW = 50  # innovations; fewer say nothing
+# What is likely where the innovations of a row are far too large for a second.
+_LIKELY = dict.fromkeys(("acceleration", "speed"), "slip, a wrong ratio, or a sensor fault")
 # Known input over accelerometer, rms: a quarter to a third in the drives we have.
 POWERFUL = 1.5
 # Ratios of (change of speed) / accelerometer that betray a unit, and what is then likely wrong.
@@ -59,7 +69,7 @@ class Check:
 
     Attributes:
         findings: what was looked at, the worst first.
-        valid_share: share of the ticks that are valid.
+        valid_share: share of the ticks that are valid; NaN where the flag `valid` was left out of the outputs.
         nis: mean normalised innovation squared of each row, by row.
         lean: mean normalised square of the rows' block means, by row.
     """
@@ -85,24 +95,32 @@ class Check:
 
 
 def check_estimate(
-    values: Mapping[str, Array], grid: Grid, measured: tuple[str, ...], log: Log, horizon: float = 0.5
+    values: Mapping[str, Array],
+    outputs: Sequence[Output],
+    grid: Grid,
+    measured: tuple[str, ...],
+    log: Log,
+    ell: float | None = None,
 ) -> Check:
     """Look at an estimate; see the module's docstring.
 
     Args:
-        values: the observer's outputs.
+        values: columns of the observer's outputs; some may have been left out.
+        outputs: all outputs of the observer; their roles say what is what.
         grid: its sampled inputs.
         measured: names of the measurements.
         log: where it came from; its faults become warnings.
-        horizon: of the lean, s: 1/ell.
+        ell: the observer's knob; the lean is taken over 1/ell s. None: HORIZON.
     """
-    valid = values["valid"] > 0.5 if "valid" in values else np.ones(len(grid), bool)
-    findings = [_validity(values, valid, grid)]
     nis: dict[str, float] = {}
     lean: dict[str, float] = {}
-    for row in ("acceleration", "speed"):
-        if f"{row}_innovation" in values:
-            findings += _row(row, values, valid, grid, horizon, nis, lean)
+    # An observer without the flag `valid` claims to be valid always; one whose flag was left out claims nothing.
+    judged = "valid" in values or all(output.name != "valid" for output in outputs)
+    valid = values["valid"] > 0.5 if "valid" in values else np.full(len(grid), judged)
+    if judged:
+        findings = [_validity(values, valid, grid), *_rows(values, outputs, measured, valid, grid, ell, nis, lean)]
+    else:
+        findings = [Finding("warn", "cannot be judged: the flag 'valid' is not among the outputs; compile with it")]
     if not measured:
         findings.append(Finding(
             "warn", "nothing measured is held against it, so a wrong parameter or unit would not show here; compare with kinematic",
@@ -123,8 +141,9 @@ def check_estimate(
     findings += [Finding("bad" if fault in absurd else "warn", fault) for fault in log.faults]
     order = {"bad": 0, "warn": 1, "ok": 2}
     return Check(
-        tuple(sorted(findings, key=lambda f: order[f.severity])), float(valid.mean()) if valid.size else 0.0, nis, lean
-    )
+        tuple(sorted(findings, key=lambda f: order[f.severity])),
+        (float(valid.mean()) if valid.size else 0.0) if judged else float("nan"), nis, lean,
+    )  # fmt: skip
 
 
 def _driver(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid) -> list[Finding]:
@@ -166,45 +185,74 @@ def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: G
     return Finding("bad" if share < 0.05 else "warn" if share < 0.5 else "ok", text, _spans(~valid, grid))
 
 
-def _row(
-    row: str, values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid, horizon: float,
-    nis: dict[str, float], lean: dict[str, float],
+def _rows(
+    values: Mapping[str, Array], outputs: Sequence[Output], measured: tuple[str, ...], valid: npt.NDArray[np.bool_],
+    grid: Grid, ell: float | None, nis: dict[str, float], lean: dict[str, float],
 ) -> list[Finding]:  # fmt: skip
-    """What the innovations of one measured row say."""
-    used = valid & (values.get(f"{row}_used", np.ones(len(grid))) > 0.5)
-    if used.sum() < 50:
-        return [Finding("warn", f"{row}: only {int(used.sum())} valid innovations, too few to judge the band")]
-    normal = np.where(used, values[f"{row}_innovation"] / values[f"{row}_innovation_sd"], 0.0)
-    nis[row] = float(np.mean(normal[used] ** 2))
-    together, weight = _blocks(normal, used, max(round(horizon / grid.dt), 1))
-    lean[row] = float(np.average(together, weights=weight)) if weight.any() else 0.0
-    said = f"{row}: the innovations scatter {nis[row] ** 0.5:.2g} and lean {lean[row] ** 0.5:.2g} times what the band allows"
-    larger = max(nis[row], lean[row])
-    if larger > WIDE:
-        severity = "bad" if larger > WRONG else "warn"
-        findings = [Finding(severity, f"{said}; it is too narrow: check vehicle parameters and units, or raise ell")]
-    else:
-        findings = [Finding("ok", f"{said} (1 is right, less is cautious)")]
-    second = max(round(1.0 / grid.dt), 1)
-    leaning, count = _blocks(normal, used, second)
-    scattering = np.add.reduceat(normal**2, np.arange(0, normal.size, second)) / np.maximum(count, 1)
-    worst = np.maximum(leaning, scattering)
-    # The second in which the estimate becomes valid is left out: what the driver did before was unknown to the filter.
-    whole = np.logical_and.reduceat(valid, np.arange(0, normal.size, second))
-    bad = np.repeat((worst > BAD_STRETCH) & (count >= 5) & whole, second)[: len(grid)]
-    if bad.any():
-        findings.append(Finding(
-            "warn", f"{row}: {bad.sum() * grid.dt:.1f} s where the innovations are up to {worst[whole].max() ** 0.5:.0f} times "
-            "their band: slip, a wrong ratio, or a sensor fault", _spans(bad, grid),
-        ))  # fmt: skip
+    """What the innovations say, row by row, and which rows cannot say anything."""
+    rows = innovation_rows(values, outputs)
+    if not rows:
+        # Where nothing is measured at all, the finding on that says more.
+        there = measured or any(output.role == "innovation" for output in outputs)
+        return [Finding("warn", "cannot be judged: no innovations among the outputs")] if there else []
+    findings = []
+    for row in rows:
+        findings += _row(row, valid, grid, ell, nis, lean)
+    for output in outputs:
+        if output.role == "innovation" and output.name not in values:
+            findings.append(
+                Finding("warn", f"{row_name(output)}: cannot be judged: {output.name} is not among the outputs")
+            )
     return findings
 
 
-def _blocks(normal: Array, used: npt.NDArray[np.bool_], length: int) -> tuple[Array, Array]:
-    """Of blocks of `length` ticks: the square of the summed innovations per innovation (1 if white), and how many there are."""
-    starts = np.arange(0, normal.size, length)
-    count = np.add.reduceat(used.astype(float), starts)
-    return np.add.reduceat(normal, starts) ** 2 / np.maximum(count, 1), count
+def _row(
+    row: Innovations, valid: npt.NDArray[np.bool_], grid: Grid, ell: float | None,
+    nis: dict[str, float], lean: dict[str, float],
+) -> list[Finding]:  # fmt: skip
+    """What the innovations of one measured row say."""
+    name = row.row
+    if row.sd is None:
+        return [
+            Finding("warn", f"{name}: cannot be judged: no standard deviation of its innovations among the outputs")
+        ]
+    findings, counted = [], valid & row.sound
+    if (broken := valid & row.used & ~row.sound).any():
+        findings.append(Finding(
+            "bad", f"{name}: {broken.sum() * grid.dt:.3g} s where innovation or standard deviation is no number, or the latter is "
+            "not above 0: an error in the observer", _spans(broken, grid),
+        ))  # fmt: skip
+    if counted.sum() < FEW:
+        return [
+            *findings,
+            Finding("warn", f"{name}: only {int(counted.sum())} valid innovations, too few to judge the band"),
+        ]
+    normal = row.normalised()
+    nis[name] = float(np.mean(normal[counted] ** 2))
+    _, together, weight = blocks(normal, counted, max(round((1 / ell if ell else HORIZON) / grid.dt), 1))
+    lean[name] = float(np.average(together, weights=weight))
+    said = f"{name}: the innovations scatter {nis[name] ** 0.5:.2g} and lean {lean[name] ** 0.5:.2g} times what the band allows"
+    larger = max(nis[name], lean[name])
+    if larger > LARGE:
+        cure = "check vehicle parameters and units" + (", or raise ell" if ell else "")
+        findings.append(Finding("bad" if larger > WRONG else "warn", f"{said}; it is too narrow: {cure}"))
+    elif larger < SMALL:
+        findings.append(Finding("ok", f"{said}; the band is wide for this sensor"))
+    else:
+        findings.append(Finding("ok", f"{said} (1 is right, less is cautious)"))
+    second = max(round(1.0 / grid.dt), 1)
+    scattering, leaning, count = blocks(normal, counted, second)
+    worst = np.maximum(leaning, scattering)
+    # The second in which the estimate becomes valid is left out: what happened before was unknown to the filter.
+    whole = np.logical_and.reduceat(valid, np.arange(0, normal.size, second))
+    bad = np.repeat((worst > BAD_STRETCH) & (count >= 5) & whole, second)[: len(grid)]
+    if bad.any():
+        likely = _LIKELY.get(name, "something the model does not know, or a sensor fault")
+        findings.append(Finding(
+            "warn", f"{name}: {bad.sum() * grid.dt:.1f} s where the innovations are up to {worst[whole].max() ** 0.5:.0f} times "
+            f"their band: {likely}", _spans(bad, grid),
+        ))  # fmt: skip
+    return findings
 
 
 def _sensors_agree(log: Log) -> list[Finding]:
