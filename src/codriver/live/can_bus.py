@@ -8,13 +8,27 @@ with can.Bus(interface="socketcan", channel="can0") as bus:
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
 from codriver.errors import LogError, NamesError
 from codriver.live.session import Live, Tick
-from codriver.logs.names_file import Entry, NamesFile, load_names
+from codriver.logs.names_file import NamesFile, load_names
+from codriver.names import VOCABULARY
 from codriver.signals.sampler import TOLERANCE
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A signal of a message that feeds a standard signal, as source number `place`: standard = gain * value + shift."""
+
+    name: str
+    place: int
+    signal: str
+    gain: float
+    shift: float
 
 
 class BusDecoder:
@@ -52,17 +66,26 @@ class BusDecoder:
                 "channels of the database, as 'Message.Signal'",
                 "correct the names file; `codriver info LOG --dbc DBC` lists the channels of a log",
             )
-        self._latest: dict[str, float] = {}
         self._messages = {m.frame_id: m for m in database.messages}
-        # By message: the entries whose first source it carries (their clock), with gain and shift of each source.
-        self._entries: dict[str, list[tuple[Entry, list[tuple[float, float]]]]] = {}
+        # By message: what its signals feed.
+        self._parts: dict[str, list[_Part]] = {}
         for entry in mapping.entries.values():
-            conversions = [entry.conversion(units[source]) for source in entry.source]
-            self._entries.setdefault(entry.source[0].split(".")[0], []).append((entry, conversions))
-        self._wanted = {s for e in mapping.entries.values() for s in e.source}
+            for place, source in enumerate(entry.source):
+                message, signal = source.split(".", 1)
+                part = _Part(entry.name, place, signal, *entry.conversion(units[source]))
+                self._parts.setdefault(message, []).append(part)
+        # Newest stamp and SI value of each source, by standard name; those of a source not met yet are too old for ever.
+        self._latest = {e.name: [(-inf, nan)] * len(e.source) for e in mapping.entries.values()}
 
-    def decode(self, identifier: int, data: bytes) -> list[tuple[str, float]]:
-        """Standard names and SI values that a frame brings; nothing for frames that are not mapped or too short."""
+    def decode(self, identifier: int, data: bytes, time: float) -> list[tuple[str, float]]:
+        """Standard names and SI values that a frame brings; nothing for frames that are not mapped or too short.
+
+        Of several sources the mean is taken as in a recorded log, see `codriver.logs.mean`.
+
+        Args:
+            identifier, data: of the frame.
+            time: its stamp, s, not decreasing.
+        """
         message = self._messages.get(identifier)
         if message is None:
             return []
@@ -70,15 +93,20 @@ class BusDecoder:
             numbers = message.decode(data, decode_choices=False, allow_truncated=True)
         except Exception:
             return []  # a frame that does not fit its database is lost, not the session
-        for signal, number in numbers.items():
-            if f"{message.name}.{signal}" in self._wanted:
-                self._latest[f"{message.name}.{signal}"] = float(number)
-        found = []
-        for entry, conversions in self._entries.get(message.name, []):
-            if entry.source[0].split(".", 1)[1] in numbers and all(s in self._latest for s in entry.source):
-                parts = [g * self._latest[s] + b for s, (g, b) in zip(entry.source, conversions, strict=True)]
-                found.append((entry.name, sum(parts) / len(parts)))
-        return found
+        brought = []
+        for part in self._parts.get(message.name, []):
+            value = part.gain * float(numbers.get(part.signal, nan)) + part.shift
+            if isfinite(value):
+                self._latest[part.name][part.place] = (time, value)
+                if part.place == 0:  # the first source is the clock
+                    brought.append(part.name)
+        return [(name, self._mean(name, time)) for name in brought]
+
+    def _mean(self, name: str, time: float) -> float:
+        """The mean of the newest values of a signal's sources, without those older than its hold time."""
+        hold = VOCABULARY[name].hold
+        alive = [value for stamp, value in self._latest[name] if stamp > -inf and time - stamp <= hold]
+        return sum(alive) / len(alive)
 
 
 def listen(frames: Iterable[Any], live: Live, decoder: BusDecoder) -> Iterator[Tick]:
@@ -96,5 +124,5 @@ def listen(frames: Iterable[Any], live: Live, decoder: BusDecoder) -> Iterator[T
             continue
         # A value belongs to a tick up to TOLERANCE before its stamp, so later ticks wait for it and its equals.
         yield from live.advance(frame.timestamp - TOLERANCE - 1e-9)
-        for name, value in decoder.decode(frame.arbitration_id, bytes(frame.data)):
+        for name, value in decoder.decode(frame.arbitration_id, bytes(frame.data), frame.timestamp):
             live.push(name, frame.timestamp, value)

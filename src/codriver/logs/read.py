@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from codriver.errors import LogError, NamesError, UnitError
+from codriver.logs.mean import mean_of
 from codriver.logs.mend import compare_clocks, drop_codes, find_faults, mend_clock, named
 from codriver.logs.names_file import Entry, NamesFile, load_names
 from codriver.logs.recording import RawSignal, Recording
@@ -86,8 +88,9 @@ def read_recording(recording: Recording, names: str | Path | NamesFile | None = 
                 f"{entry.name}: the recording has no channel '{absent[0]}'"
                 + (f"; did the names file mean {near}?" if near else "")
             )
-            continue
-        signals.append(_standard(entry, [raw[source] for source in entry.source], faults))
+        if entry.source[0] not in absent:  # the first of several gives the clock; a mean can do without the others
+            there = {source: raw[source] for source in entry.source if source in raw}
+            signals.append(_standard(entry, there, faults))
     signals = [signal for signal in signals if len(signal)]
     if not signals:
         raise (LogError if names is None else NamesError)(
@@ -114,30 +117,25 @@ def own_names(recording: Recording) -> NamesFile:
     return NamesFile(entries, "the channels' own names")
 
 
-def _standard(entry: Entry, parts: list[RawSignal], faults: list[str]) -> Signal:
-    """One standard signal from its raw parts."""
+def _standard(entry: Entry, parts: Mapping[str, RawSignal], faults: list[str]) -> Signal:
+    """One standard signal from its raw parts, by their source."""
     target = VOCABULARY[entry.name].unit
-    mended = []
-    for source, part in zip(entry.source, parts, strict=True):
+    made = []
+    for source, part in parts.items():
         time, values, notes = mend_clock(np.asarray(part.time, float), np.asarray(part.values, float))
         faults.extend(f"{named(entry.name, source)}: {note}" for note in notes)
         try:
             gain, shift = entry.conversion(part.unit)
         except UnitError as error:
             raise UnitError(f"{entry.name} ({source}): {error.found}", error.expected, error.do) from None
-        mended.append((time, values if (gain, shift) == (1.0, 0.0) else gain * values + shift))
-    time, values = mended[0]
-    for other_time, other in mended[1:]:
-        if other_time.shape == time.shape and np.array_equal(other_time, time):
-            values = values + other
-        else:  # held onto the first part's clock
-            index = np.searchsorted(other_time, time, side="right") - 1
-            values = (
-                values + np.where(index >= 0, other[np.maximum(index, 0)], np.nan) if other.size else values + np.nan
-            )
-    signal = Signal(
-        entry.name, time, values / len(mended) if len(mended) > 1 else values, target, " + ".join(entry.source)
-    )
+        values = values if (gain, shift) == (1.0, 0.0) else gain * values + shift
+        made.append(Signal(entry.name, time, values, target, source))
+    signal = made[0]
+    if len(made) > 1:  # a code of one source would hide in the mean
+        cleaned = [drop_codes(part) for part in made]
+        faults.extend(sentence for _, told in cleaned for sentence in told)
+        signal, silent = mean_of([part for part, _ in cleaned])
+        faults.extend(silent)
     missing = find_faults(signal)  # before the codes below become NaN too, which would be told twice
     signal, codes = drop_codes(signal)
     faults.extend([*missing, *codes])

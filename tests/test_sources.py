@@ -1,0 +1,107 @@
+"""From a source's channels to a standard signal, from a recording and from a live bus alike."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import codriver as cd
+from codriver.live import BusDecoder
+from codriver.logs.names_file import parse_names
+
+DBC = """VERSION ""
+BU_: X
+BO_ 256 Left: 2 X
+ SG_ Speed : 0|16@1+ (0.01,0) [0|655] "km/h" X
+BO_ 257 Right: 2 X
+ SG_ Speed : 0|16@1+ (0.01,0) [0|655] "km/h" X
+BO_ 258 Box: 1 X
+ SG_ Gear : 0|4@1+ (1,0) [0|15] "" X
+ SG_ Ready : 4|1@1+ (1,0) [0|1] "" X
+"""
+LEFT, RIGHT, BOX = 256, 257, 258
+Frame = tuple[float, int, bytes]
+MEAN = '[longitudinal_speed]\nsource = ["Left.Speed", "Right.Speed"]\n'
+
+
+def speed(metres_per_second: float) -> bytes:
+    return round(metres_per_second * 360).to_bytes(2, "little")
+
+
+def each(identifier: int, stamps: np.ndarray, payload: bytes) -> list[Frame]:
+    return [(round(float(t), 6), identifier, payload) for t in stamps]
+
+
+@pytest.fixture
+def both(tmp_path: Path):
+    """Frames through `read` and through `BusDecoder`: the log, and what live gives by name as (times, values)."""
+
+    def call(frames: list[Frame], names: str) -> tuple[cd.Log, dict[str, np.ndarray]]:
+        frames = sorted(frames)
+        (tmp_path / "car.dbc").write_text(DBC)
+        lines = [f"({t:.6f}) can0 {i:03X}#{payload.hex().upper()}\n" for t, i, payload in frames]
+        (tmp_path / "drive.log").write_text("".join(lines))
+        mapping = parse_names(names, "names.toml")
+        log = cd.read(tmp_path / "drive.log", dbc=tmp_path / "car.dbc", names=mapping)
+        decoder = BusDecoder(tmp_path / "car.dbc", mapping)
+        live: dict[str, list[tuple[float, float]]] = {}
+        for t, i, payload in frames:
+            for name, value in decoder.decode(i, payload, t):
+                live.setdefault(name, []).append((t, value))
+        return log, {name: np.array(pairs).T for name, pairs in live.items()}
+
+    return call
+
+
+def alike(log: cd.Log, live: dict[str, np.ndarray]) -> None:
+    """Both have the same numbers at the same times."""
+    assert set(log) == set(live)
+    for name, signal in log.items():
+        there = np.isfinite(signal.values)
+        np.testing.assert_array_equal(live[name], [signal.time[there], signal.values[there]])
+
+
+class TestMean:
+    def test_a_dead_source_does_not_pull_it(self, both):
+        t = np.arange(0, 30, 0.1)
+        frames = each(LEFT, t, speed(10)) + each(RIGHT, t[:100] + 0.01, speed(0))
+        log, live = both(frames, MEAN)
+        alike(log, live)
+        mean = log["longitudinal_speed"]
+        np.testing.assert_allclose(mean.values[(mean.time > 0.05) & (mean.time < 10.4)], 5)
+        np.testing.assert_allclose(mean.values[mean.time > 10.45], 10)
+        assert (
+            "longitudinal_speed (Right.Speed): silent from 9.91 to 29.90 s; the mean is taken without it" in log.faults
+        )
+
+    def test_a_source_that_comes_back(self, both):
+        t = np.arange(0, 30, 0.1)
+        right = t[(t < 5) | ((t > 8) & (t < 12)) | (t > 20)] + 0.01
+        log, live = both(each(LEFT, t, speed(10)) + each(RIGHT, right, speed(0)), MEAN)
+        alike(log, live)
+        assert any("silent 2 times, the longest from 11.91 to 20.11 s" in fault for fault in log.faults)
+        assert log["longitudinal_speed"].values[-1] == pytest.approx(5)
+
+    def test_a_slow_source_is_held_in_silence(self, both):
+        log, live = both(
+            each(LEFT, np.arange(0, 20, 0.02), speed(10)) + each(RIGHT, np.arange(0.01, 20, 0.4), speed(8)), MEAN
+        )
+        alike(log, live)
+        assert not log.faults
+        assert log["longitudinal_speed"].values[1:] == pytest.approx(9)
+
+    def test_a_source_that_never_spoke(self, both):
+        log, live = both(each(LEFT, np.arange(0, 20, 0.1), speed(10)), MEAN)
+        alike(log, live)
+        assert any("no channel 'Right.Speed'" in fault for fault in log.faults)
+
+    def test_a_code_of_one_source_does_not_hide_in_it(self, both):
+        """655.35 km/h and 36 km/h have a mean that a car can drive."""
+        t = np.arange(0, 20, 0.1)
+        right = each(RIGHT, t - 0.01 + 0.02, speed(10))
+        right[50] = (right[50][0], RIGHT, b"\xff\xff")
+        log, _ = both(each(LEFT, t, speed(10)) + right, MEAN)
+        assert log["longitudinal_speed"].values == pytest.approx(10)
+        assert any("Right.Speed): 1 of 200 values are 182.042 m/s" in fault for fault in log.faults)
