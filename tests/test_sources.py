@@ -9,6 +9,7 @@ import pytest
 
 import codriver as cd
 from codriver.live import BusDecoder
+from codriver.logs.mend import mend_clock
 from codriver.logs.names_file import parse_names
 
 DBC = """VERSION ""
@@ -105,3 +106,35 @@ class TestMean:
         log, _ = both(each(LEFT, t, speed(10)) + right, MEAN)
         assert log["longitudinal_speed"].values == pytest.approx(10)
         assert any("Right.Speed): 1 of 200 values are 182.042 m/s" in fault for fault in log.faults)
+
+
+class TestClock:
+    def test_two_drives_in_one_file_are_not_mixed(self, both_drives):
+        """The second drive is the longer one; each was driven at a speed of its own."""
+        log, told = both_drives
+        speed = log["longitudinal_speed"]
+        assert (speed.time[0], speed.time[-1]) == (0, 29.9)
+        np.testing.assert_allclose(speed.values, 20)
+        assert "the clock starts anew 1 time" in told
+        assert "the longest run, 0 to 29.9 s, is kept; left out: 0 to 19.9 s" in told
+
+    @pytest.fixture
+    def both_drives(self, tmp_path):
+        rows = [(t, 10.0) for t in np.arange(0, 20, 0.1)] + [(t, 20.0) for t in np.arange(0, 30, 0.1)]
+        lines = "".join(f"{t:.3f},{v}\n" for t, v in rows)
+        (tmp_path / "d.csv").write_text("time [s],longitudinal_speed [m/s]\n" + lines)
+        log = cd.read(tmp_path / "d.csv")
+        return log, " ".join(log.faults)
+
+    def test_stamps_that_swapped_places_are_sorted(self):
+        _, values, notes = mend_clock(np.array([0, 0.2, 0.1, 0.3]), np.array([0.0, 2, 1, 3]))
+        np.testing.assert_array_equal(values, [0, 1, 2, 3])
+        assert notes == ["time runs backwards once, by 0.1 s; samples sorted by time"]
+
+    @pytest.mark.parametrize("stamp", [0.0, 500.0])
+    def test_one_stamp_far_off_costs_one_sample(self, stamp):
+        time = 10 + np.arange(100) / 10
+        time[50] = stamp
+        mended, _, notes = mend_clock(time, time)
+        assert mended.size == 99
+        assert notes == [f"1 sample with a stamp far from its neighbours' left out ({stamp:g} s)"]

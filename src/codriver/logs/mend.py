@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from math import isinf
 
 import numpy as np
+import numpy.typing as npt
 
 from codriver.names import VOCABULARY
 from codriver.signals import Signal
@@ -17,6 +18,8 @@ STUCK_SECONDS = 5.0
 CODES_AT_MOST = 3
 # A clock that is this far from the others' is another clock, and no pause.
 OTHER_CLOCK = 3600.0
+# A clock that steps back by more than this began anew; by less, samples merely swapped places. s.
+RESTART = 1.0
 LATE = 2.0  # s
 REST_PRESSURE = 0.3e5  # Pa
 _ANALOGUE = {"longitudinal_acceleration", "lateral_acceleration", "yaw_rate", "roll_rate", "pitch_rate"}
@@ -25,8 +28,10 @@ _ANALOGUE = {"longitudinal_acceleration", "lateral_acceleration", "yaw_rate", "r
 def mend_clock(time: Array, values: Array) -> tuple[Array, Array, list[str]]:
     """Make a clock run forward.
 
-    Samples without a finite stamp are left out. Where time runs backwards for a few samples (two threads writing one
-    file) they are sorted. Of several values with one stamp the last is kept.
+    Samples without a finite stamp are left out. Where time runs backwards a little (two threads writing one file) the
+    samples are sorted. Where it runs backwards by more than `RESTART` the clock began anew (two drives in one file):
+    the run that lasts longest is kept, since sorting would mix the drives. A single stamp that far off is no new clock;
+    its sample is left out. Of several values with one stamp the last is kept.
 
     Returns:
         time, values, and a sentence for each kind of fault mended.
@@ -34,19 +39,56 @@ def mend_clock(time: Array, values: Array) -> tuple[Array, Array, list[str]]:
     notes = []
     finite = np.isfinite(time)
     if not finite.all():
-        notes.append(f"{int((~finite).sum())} samples without a time stamp left out")
+        notes.append(f"{_samples(~finite)} without a time stamp left out")
         time, values = time[finite], values[finite]
+    if (np.diff(time) < -RESTART).any():
+        astray = _astray(time)
+        if astray.any():
+            shown = ", ".join(f"{stamp:.10g}" for stamp in time[astray][:3]) + (", ..." if astray.sum() > 3 else "")
+            notes.append(f"{_samples(astray)} with a stamp far from its neighbours' left out ({shown} s)")
+            time, values = time[~astray], values[~astray]
+        runs = np.split(np.arange(time.size), np.flatnonzero(np.diff(time) < -RESTART) + 1)
+        if len(runs) > 1:
+            kept = max(runs, key=lambda run: float(np.ptp(time[run])))
+            left = [_span(time[run]) for run in runs if run is not kept]
+            notes.append(
+                f"the clock starts anew {len(runs) - 1} time{'s' if len(runs) > 2 else ''}, as where drives are joined in one "
+                f"file: the longest run, {_span(time[kept])}, is kept; left out: {', '.join(left[:4])}"
+                + (f" and {len(left) - 4} more" if len(left) > 4 else "")
+            )
+            time, values = time[kept], values[kept]
     backwards = np.flatnonzero(np.diff(time) < 0)
     if backwards.size:
         worst = float((time[backwards] - time[backwards + 1]).max())
-        notes.append(f"time runs backwards {backwards.size} times, by up to {worst:.3g} s; samples sorted by time")
+        often = "once, by" if backwards.size == 1 else f"{backwards.size} times, by up to"
+        notes.append(f"time runs backwards {often} {worst:.3g} s; samples sorted by time")
         order = np.argsort(time, kind="stable")
         time, values = time[order], values[order]
     last = np.append(np.diff(time) > 0, True) if time.size else np.zeros(0, bool)
     if not last.all():
-        notes.append(f"{int((~last).sum())} samples share a time stamp with the next; the last of each is kept")
+        share = "shares" if (~last).sum() == 1 else "share"
+        notes.append(f"{_samples(~last)} {share} a time stamp with the next; the last of each is kept")
         time, values = time[last], values[last]
     return time, values, notes
+
+
+def _astray(time: Array) -> npt.NDArray[np.bool_]:
+    """Single stamps more than `RESTART` before or after both neighbours, which are themselves in order."""
+    astray = np.zeros(time.size, bool)
+    before, it, after = time[:-2], time[1:-1], time[2:]
+    astray[1:-1] = (after >= before) & ((it < before - RESTART) | (it > after + RESTART))
+    return astray
+
+
+def _span(time: Array) -> str:
+    """From the first to the last stamp, for messages."""
+    return f"{time.min():.10g} to {time.max():.10g} s"
+
+
+def _samples(which: npt.NDArray[np.bool_]) -> str:
+    """How many samples are meant, for messages."""
+    count = int(which.sum())
+    return f"{count} sample" + ("s" if count != 1 else "")
 
 
 def drop_codes(signal: Signal) -> tuple[Signal, list[str]]:
