@@ -233,6 +233,77 @@ def test_gear_unknown_during_a_shift_keeps_the_intention(car):
     assert not shift[1610:].any()
 
 
+@pytest.mark.parametrize(("gear", "known"), [(6, False), (-1, False), (0, True), (5, True)])
+def test_a_gear_that_the_vehicle_lacks_is_not_known(gear, known, car):
+    """Sixth gear, or reverse, of a car whose file has neither: not valid. Neutral is known: no torque passes."""
+    gears = np.concatenate([np.full(1500, 3.0), np.full(1500, float(gear))])
+    estimate = cd.compile(cd.build("intent-torque", car)).run(drive_log(car, gear=gears))
+    assert estimate.valid[1000:1500].all()
+    assert estimate.flag("inputs_known")[1600:].all() == known
+    assert estimate.valid[1600:].any() == known
+
+
+def test_the_brake_switch_does_not_latch_the_pressure(car):
+    """A rest pressure of 0.4 bar and one second of the switch: braking for that second only."""
+    switch = np.zeros(3000)
+    switch[1000:1100] = 1
+    log = drive_log(car, brake_pressure=np.full(3000, 0.4e5), brake_switch=switch)
+    sigma = cd.compile(cd.build("intent-pedals", car)).run(log).flag("braking")
+    np.testing.assert_array_equal(np.flatnonzero(sigma), np.arange(1000, 1100))
+
+
+@pytest.mark.parametrize("form", ["kalman", "constant"])
+def test_lost_input_returns_gently(form, car):
+    """u = -0.3 m/s^2, lost for 2 s: the jump of u is not taken for the driver's; valid again when settled."""
+    log = drive_log(car, engine_torque=np.full(3000, -17.0), seconds=30)
+    torque = log["engine_torque"]
+    kept = (torque.time < 15) | (torque.time > 17)
+    broken = log.with_signals(cd.Signal("engine_torque", torque.time[kept], torque.values[kept], "N*m"))
+    estimate = cd.compile(cd.build("intent-torque", car, form=form)).run(broken)
+    jerk = estimate.columns["intentional_jerk"]
+    after = estimate.valid & (estimate.time > 15.6)
+    assert after.any()
+    assert not estimate.valid[(estimate.time > 15.6) & (estimate.time < 17.1)].any()
+    assert (np.abs(jerk[after]) < 0.15).all()
+
+
+@pytest.mark.parametrize("every", [1, 2, 5, 8, 12, 20])
+@pytest.mark.parametrize("preset", ["bisoffi2017", "bisoffi2015"])
+def test_constant_form_bears_sparse_rows(preset, every):
+    """The speed on every n-th tick only: stable, and near the Kalman form (without counting, unstable from 5 or 8 on)."""
+    log, _ = motion_log(200, noise=0, speed_noise=0)
+    v = log["longitudinal_speed"]
+    sparse = log.with_signals(cd.Signal(v.name, v.time[::every], v.values[::every], v.unit))
+    run = lambda drive, form: cd.compile(cd.build("kinematic", preset=preset, form=form, ell=1.4)).run(drive)  # noqa: E731
+    reference = run(log, "kalman").columns["longitudinal_jerk"][6000:]
+    found = run(sparse, "constant").columns["longitudinal_jerk"][6000:]
+    assert np.sqrt(np.mean((found[: reference.size] - reference[: found.size]) ** 2)) < 0.12
+
+
+def test_constant_form_is_not_valid_in_a_gap():
+    log, _ = motion_log(60)
+    kept = (log["longitudinal_speed"].time < 30) | (log["longitudinal_speed"].time > 40)
+    gappy = cd.Log.of([cd.Signal(s.name, s.time[kept], s.values[kept], s.unit) for s in log.values()])
+    estimate = cd.compile(cd.build("kinematic", form="constant")).run(gappy)
+    assert not estimate.valid[(estimate.time > 30.6) & (estimate.time < 42)].any()
+    assert estimate.valid[(estimate.time > 50) & (estimate.time < 59)].all()
+
+
+@pytest.mark.parametrize("form", ["kalman", "constant"])
+def test_band_does_not_learn_from_the_start(form):
+    """A log that starts while braking hard has nearly the band of one that starts before."""
+    t = np.arange(6000) / 100
+    a = np.where(t < 30, 0.0, -0.5)
+    v = 40 + np.cumsum(a) / 100
+    noise = 0.05 * np.random.default_rng(0).standard_normal(t.size)
+    log = cd.Log.of(
+        [cd.Signal("longitudinal_speed", t, v, "m/s"), cd.Signal("longitudinal_acceleration", t, a + noise, "m/s^2")]
+    )
+    program = cd.compile(cd.build("kinematic", form=form))
+    whole, late = program.run(log), program.run(log.between(35, 60))
+    assert late.sd("longitudinal_jerk")[-1] < 1.5 * whole.sd("longitudinal_jerk")[-1]
+
+
 def test_standstill(car):
     """Standing on a slope with the brake on: no intention, no jerk, and the offset is the slope."""
     v = np.concatenate([np.full(1000, 10.0), 10 - 0.01 * np.arange(1000) * 1.0, np.zeros(2000)])

@@ -52,6 +52,30 @@ def test_virtual_bus(demo_files, car):
     assert all(np.isfinite(list(t.values.values())).all() for t in ticks)
 
 
+@pytest.mark.parametrize("begin", [0.0, 1.5e9])
+@pytest.mark.parametrize("late", [0.0, 3e-5, 1.7e-4])
+def test_stamps_that_meet_the_ticks(begin, late, car):
+    """Values stamped at the ticks or shortly after, from 0 and since 1970: live has the bits of the batch."""
+    t = begin + np.arange(600) * 0.01 + late
+    rng = np.random.default_rng(3)
+    log = cd.Log.of([
+        cd.Signal("longitudinal_acceleration", t, rng.standard_normal(600), "m/s^2"),
+        cd.Signal("longitudinal_speed", t[::2], 10 + rng.standard_normal(300), "m/s"),
+    ])  # fmt: skip
+    program = cd.compile(cd.build("kinematic", dt=0.01))
+    batch = program.run(log)
+    rows = sorted((x, n, v) for n, s in log.items() for x, v in zip(s.time, s.values, strict=True))
+    live, ticks = Live(program), []
+    for stamp, name, value in rows:
+        ticks += live.advance_before(stamp)
+        live.push(name, stamp, value)
+    ticks += live.advance(rows[-1][0] + 1e-3)
+    n = min(len(ticks), len(batch.grid))
+    assert n >= 599
+    for name in ("longitudinal_jerk", "longitudinal_jerk_sd"):
+        np.testing.assert_array_equal([tick.values[name] for tick in ticks[:n]], batch.columns[name][:n])
+
+
 def test_nothing_before_the_first_measurement(car):
     live = Live(cd.compile(cd.build("intent-pedals", car)))
     live.push("gear", 0.0, 3.0)

@@ -7,7 +7,8 @@ import codriver as cd
 from codriver.errors import DesignError, MissingSignal, UsageError
 from codriver.observers import Observer, Output
 from codriver.program import Stepper
-from codriver.signals import Channel, Sampler
+from codriver.signals import Channel, Grid, Sampler
+from codriver.testing import check_observer
 from conftest import constant, motion_log
 
 
@@ -70,8 +71,48 @@ def test_wrong_state_is_refused(text):
 
 def test_state_of_another_design_is_refused():
     other = cd.compile(cd.build("kinematic", dt=0.02)).live().save()
-    with pytest.raises(UsageError, match=r"dt = 0.02 s"):
+    with pytest.raises(UsageError, match=r"saved with dt = 0\.02"):
         cd.compile(cd.build("kinematic", dt=0.01)).live().restore(other)
+    slow = cd.compile(cd.build("kinematic", dt=0.01, ell=1)).live().save()
+    with pytest.raises(UsageError, match=r"ell = 1"):
+        cd.compile(cd.build("kinematic", dt=0.01, ell=3)).live().restore(slow)
+
+
+def test_a_drive_in_pieces(car, demo):
+    """Piece by piece, with the carry handed on: the bits of the whole."""
+    program = cd.compile(cd.build("intent-pedals", car))
+    grid = demo.measured.sample(program.observer.channels, 0.01)
+    whole, carry, parts = program.run_grid(grid), program.observer.carry, []
+    for piece in np.array_split(np.arange(len(grid)), 7):
+        part = Grid(
+            grid.time[piece],
+            grid.dt,
+            *({n: c[piece] for n, c in columns.items()} for columns in (grid.values, grid.fresh, grid.held)),
+        )
+        carry, out = program.advance(part, carry)
+        parts.append(out)
+    for name, column in whole.items():
+        np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), column)
+
+
+def test_a_signal_held_by_one_and_measured_by_another():
+    """In a chain each part sees the flag of its own role: held for the input, fresh for the measurement."""
+    holds = Observer(
+        "holds", 0.01, ("longitudinal_speed",), (), {"n": 0.0}, (Output("held_share", "1", "flag"),),
+        lambda c, u, y, ok, rho: ({"n": c["n"] + 1.0}, {"held_share": ok["longitudinal_speed"]}),
+    )  # fmt: skip
+    measures = Observer(
+        "measures", 0.01, (), ("longitudinal_speed",), {"m": 0.0}, (Output("fresh_share", "1", "flag"),),
+        lambda c, u, y, ok, rho: ({"m": c["m"] + 1.0}, {"fresh_share": ok["longitudinal_speed"]}),
+    )  # fmt: skip
+    both = cd.chain(holds, measures)
+    assert both.channels == ("longitudinal_speed",)
+    assert [flag.name for flag in both.flags] == ["longitudinal_speed_fresh", "longitudinal_speed_held"]
+    t = np.arange(0, 2, 0.02)
+    estimate = cd.compile(both).run(cd.Log.of([constant("longitudinal_speed", 5, t)]))
+    assert estimate.flag("held_share").all()
+    assert estimate.flag("fresh_share").mean() == pytest.approx(0.5, abs=0.01)
+    check_observer(both)
 
 
 def test_missing_signal_says_what_is_missing(car):

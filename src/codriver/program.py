@@ -98,29 +98,30 @@ class Program:
             log,
         )
 
-    def run_grid(self, grid: Grid, carry: Mapping[str, float] | None = None) -> dict[str, Array]:
-        """Run over sampled columns.
+    def run_grid(self, grid: Grid) -> dict[str, Array]:
+        """Run over sampled columns, from the observer's initial carry: a column for each output."""
+        return self.advance(grid, self.observer.carry)[1]
+
+    def advance(self, grid: Grid, carry: Mapping[str, float]) -> tuple[dict[str, float], dict[str, Array]]:
+        """Run on over sampled columns.
 
         Args:
             grid: has the observer's channels.
-            carry: where to start from; None is the observer's initial carry.
+            carry: where to start from.
 
         Returns:
-            a column for each output.
+            the carry after the last tick, and a column for each output: a drive in pieces gives the bits of the whole.
         """
         n = len(grid)
-        measured = set(self.observer.measured)
         columns = [np.ascontiguousarray(grid.values[name], dtype=np.float64) for name in self.observer.channels]
-        flags = [
-            np.ascontiguousarray((grid.fresh if name in measured else grid.held)[name], dtype=np.bool_)
-            for name in self.observer.channels
-        ]
+        flags = [np.ascontiguousarray(flag, dtype=np.bool_) for flag in self.observer.flag_columns(grid)]
         outputs = [np.empty(n) for _ in self.recorded.outputs]
-        state = np.array([(carry or self.observer.carry)[key] for key in self.recorded.carry], dtype=np.float64)
+        state = np.array([carry[key] for key in self.recorded.carry], dtype=np.float64)
         given = _pointers([*columns, *flags])
         made = _pointers(outputs)
         self._compiled.run(n, state.ctypes.data, ctypes.addressof(given), ctypes.addressof(made))
-        return dict(zip(self.recorded.outputs, outputs, strict=True))
+        after = dict(zip(self.recorded.carry, state.tolist(), strict=True))
+        return after, dict(zip(self.recorded.outputs, outputs, strict=True))
 
     def live(self) -> Stepper:
         """A stepper at the observer's initial carry."""
@@ -130,8 +131,8 @@ class Program:
 class Stepper:
     """One step a call.
 
-    `stepper(row)` is the quick way: `row` holds the numbers of `inputs` in order (channels, then 1 or 0 for each channel's
-    ok flag), the result those of `outputs`. `step(values)` is the easy one. The state can be saved and restored exactly.
+    `stepper(row)` is the quick way: `row` holds the numbers of `inputs` in order (channels, then 1 or 0 for each flag
+    of the observer), the result those of `outputs`. `step(values)` is the easy one. The state can be saved and restored exactly.
 
     Attributes:
         inputs, outputs: names, in the order of the row and the result.
@@ -142,19 +143,19 @@ class Stepper:
         self.inputs, self.outputs = recorded.inputs, recorded.outputs
         self._program = program  # owns the machine code
         self._run = program._compiled.run
-        channels = len(observer.channels)
-        self._channels = observer.channels
+        channels, flags = len(observer.channels), len(observer.flags)
+        self._channels, self._flags = observer.channels, observer.flags
         self._carry = (ctypes.c_double * max(len(recorded.carry), 1))(*[observer.carry[key] for key in recorded.carry])
-        self._in = ctypes.create_string_buffer(9 * channels or 1)
+        self._in = ctypes.create_string_buffer(8 * channels + flags or 1)
         self._out = (ctypes.c_double * max(len(recorded.outputs), 1))()
-        base, flags = ctypes.addressof(self._in), ctypes.addressof(self._in) + 8 * channels
-        where = [base + 8 * k for k in range(channels)] + [flags + k for k in range(channels)]
+        base = ctypes.addressof(self._in)
+        where = [base + 8 * k for k in range(channels)] + [base + 8 * channels + k for k in range(flags)]
         self._given = (ctypes.c_void_p * max(len(where), 1))(*where)
         out = ctypes.addressof(self._out)
         self._made = (ctypes.c_void_p * max(len(recorded.outputs), 1))(
             *[out + 8 * k for k in range(len(recorded.outputs))]
         )
-        self._pack = struct.Struct(f"={channels}d{channels}?").pack_into
+        self._pack = struct.Struct(f"={channels}d{flags}?").pack_into
         self._unpack = struct.Struct(f"={len(recorded.outputs)}d").unpack_from
         self._call = (1, ctypes.addressof(self._carry), ctypes.addressof(self._given), ctypes.addressof(self._made))
 
@@ -170,8 +171,9 @@ class Stepper:
         Args:
             values: by standard name: inputs as last known, measurements only on the tick they arrived.
         """
-        numbers = [float(values.get(name, float("nan"))) for name in self._channels]
-        return dict(zip(self.outputs, self([*numbers, *[int(isfinite(x)) for x in numbers]]), strict=True))
+        numbers = {name: float(values.get(name, float("nan"))) for name in self._channels}
+        there = [isfinite(numbers[flag.channel]) for flag in self._flags]
+        return dict(zip(self.outputs, self([*numbers.values(), *there]), strict=True))
 
     @property
     def carry(self) -> dict[str, float]:
@@ -181,31 +183,27 @@ class Stepper:
     def save(self) -> str:
         """The state as JSON text with hexadecimal floats: restored, it continues with the same bits."""
         exact = {name: value.hex() for name, value in self.carry.items()}
-        return json.dumps(
-            {"observer": self._program.observer.name, "dt": self._program.observer.dt.hex(), "carry": exact}
-        )
+        return json.dumps({"design": provenance(self._program.observer), "carry": exact})
 
     def restore(self, text: str) -> None:
         """Continue from a saved state.
 
         Raises:
-            UsageError: the text was saved by another observer.
+            UsageError: the text was saved by another design (name, settings) or version.
         """
         try:
             saved = json.loads(text)
-            dt = float.fromhex(saved["dt"])
+            design = dict(saved["design"])
             carry = {name: float.fromhex(value) for name, value in saved["carry"].items()}
         except (ValueError, KeyError, TypeError, AttributeError):
             raise UsageError("text that is no saved state", "what Stepper.save gave", "save again") from None
-        observer = self._program.observer
-        if (
-            saved.get("observer") != observer.name
-            or dt != observer.dt
-            or list(carry) != list(self._program.recorded.carry)
-        ):
+        mine = provenance(self._program.observer)
+        if design != mine or list(carry) != list(self._program.recorded.carry):
+            differ = [key for key in {**mine, **design} if mine.get(key) != design.get(key)]
+            said = [", ".join(f"{key} = {d.get(key)}" for key in differ) or "another carry" for d in (design, mine)]
             raise UsageError(
-                f"a state of '{saved.get('observer')}' at dt = {dt:g} s", f"one of '{observer.name}' at dt = {observer.dt:g} s",
-                "restore it into a stepper of the same design and outputs",
+                f"a state saved with {said[0]}", f"one saved with {said[1]}",
+                "restore it into a stepper of the same design and version",
             )  # fmt: skip
         self._carry[: len(carry)] = list(carry.values())
 

@@ -90,13 +90,14 @@ def _header(program: Program, real: str) -> str:
     observer, recorded = program.observer, program.recorded
     name = recorded.name
     guard = f"CODRIVER_{name.upper()}_H"
-    measured = set(observer.measured)
     settings = ", ".join(f"{key} = {value}" for key, value in observer.settings.items())
     inputs = []
     for channel in observer.channels:
         inputs.append((name_type(name), channel, _describe(channel)))
-        note = "arrived since the last step" if channel in measured else "known"
-        inputs.append(("bool", f"{channel}_ok", f"{note}; if false, the value is not looked at"))
+        for flag in observer.flags:
+            note = "arrived since the last step" if flag.kind == "fresh" else "known"
+            if flag.channel == channel:
+                inputs.append(("bool", flag.name, f"{note}; if false, the value is not looked at"))
     kept = [o for o in observer.outputs if o.name in recorded.outputs]
     lines = [
         f"/* {observer.name}: {settings}", f" * One step every {observer.dt:g} s. SI units, axes of ISO 8855.", " */",
@@ -142,13 +143,18 @@ def _golden_text(program: Program) -> dict[str, str]:
     recorded = program.recorded
     grid = golden_inputs(program)
     results = program.run_grid(grid)
-    measured = set(program.observer.measured)
-    channels = program.observer.channels
-    flags = {n: (grid.fresh if n in measured else grid.held)[n] for n in channels}
+    observer = program.observer
+    flags = {f.name: column for f, column in zip(observer.flags, observer.flag_columns(grid), strict=True)}
+    of = {channel: [f.name for f in observer.flags if f.channel == channel] for channel in observer.channels}
     rows_in, rows_out = [], []
     for k in range(len(grid)):
-        pairs = [f"{grid.values[n][k].hex()}, {'true' if flags[n][k] else 'false'}" for n in channels]
-        rows_in.append("    { " + ", ".join(pairs) + " },")
+        fields = []
+        for channel, flagged in of.items():
+            fields += [
+                float(grid.values[channel][k]).hex(),
+                *("true" if flags[name][k] else "false" for name in flagged),
+            ]
+        rows_in.append("    { " + ", ".join(fields) + " },")
         rows_out.append("    { " + ", ".join(float(results[n][k]).hex() for n in recorded.outputs) + " },")
     finite = np.all([np.isfinite(results[n]).all() for n in recorded.outputs])
     assert finite, "golden outputs must be finite"

@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 # A CasADi SX or a float; CasADi ships no types.
 Scalar = Any
 
@@ -66,11 +68,6 @@ def minimum(first: Scalar, second: Scalar) -> Scalar:
     return select(first < second, first, second)
 
 
-def hold_if(condition: Scalar, new: Scalar, old: Scalar) -> Scalar:
-    """The new value while the condition holds, else the old one (a sample and hold)."""
-    return select(condition, new, old)
-
-
 def _plain(x: Scalar) -> bool:
     """Whether it is a Python or numpy number, not a symbol."""
-    return isinstance(x, (bool, int, float))
+    return isinstance(x, (bool, int, float, np.bool_, np.number))

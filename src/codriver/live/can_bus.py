@@ -17,7 +17,6 @@ from codriver.errors import LogError, NamesError
 from codriver.live.session import Live, Tick
 from codriver.logs.names_file import NamesFile, load_names
 from codriver.names import VOCABULARY
-from codriver.signals.sampler import TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -122,7 +121,6 @@ def listen(frames: Iterable[Any], live: Live, decoder: BusDecoder) -> Iterator[T
     for frame in frames:
         if frame.is_error_frame or frame.is_remote_frame:
             continue
-        # A value belongs to a tick up to TOLERANCE before its stamp, so later ticks wait for it and its equals.
-        yield from live.advance(frame.timestamp - TOLERANCE - 1e-9)
+        yield from live.advance_before(frame.timestamp)
         for name, value in decoder.decode(frame.arbitration_id, bytes(frame.data), frame.timestamp):
             live.push(name, frame.timestamp, value)

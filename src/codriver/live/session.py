@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from codriver.program import Program
 from codriver.signals import Channel, Sampler
+from codriver.signals.sampler import TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,8 @@ class Live:
     def __init__(self, program: Program) -> None:
         observer = program.observer
         self.stepper = program.live()
-        self._channels, self._measured = observer.channels, frozenset(observer.measured)
-        self._starts = self._measured or frozenset(observer.required)
+        self._channels, self._flags = observer.channels, observer.flags
+        self._starts = frozenset(observer.measured or observer.required)
         self._dt = observer.dt
         self._sampler = Sampler([Channel.named(name) for name in observer.channels], observer.dt)
         self._start: float | None = None
@@ -63,12 +64,20 @@ class Live:
 
     def advance(self, now: float) -> Iterator[Tick]:
         """All ticks that are due: those at or before `now`, s. Values stamped later wait for their tick."""
-        while self._start is not None:
-            tick = self._start + self._dt * self._count
-            if tick > now:
-                return
-            row, fresh, held = self._sampler.row(tick)
-            ok = [(fresh if name in self._measured else held)[name] for name in self._channels]
-            out = self.stepper([*[row[name] for name in self._channels], *ok])
-            self._count += 1
-            yield Tick(tick, dict(zip(self.stepper.outputs, out, strict=True)))
+        while (tick := self._next()) is not None and tick <= now:
+            yield self._step(tick)
+
+    def advance_before(self, stamp: float) -> Iterator[Tick]:
+        """All ticks to which a value with this stamp, s, comes too late; call it before pushing the value."""
+        while (tick := self._next()) is not None and tick + TOLERANCE < stamp:
+            yield self._step(tick)
+
+    def _next(self) -> float | None:
+        return None if self._start is None else self._start + self._dt * self._count
+
+    def _step(self, tick: float) -> Tick:
+        row, fresh, held = self._sampler.row(tick)
+        ok = [(fresh if flag.kind == "fresh" else held)[flag.channel] for flag in self._flags]
+        out = self.stepper([*[row[name] for name in self._channels], *ok])
+        self._count += 1
+        return Tick(tick, dict(zip(self.stepper.outputs, out, strict=True)))

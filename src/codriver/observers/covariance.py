@@ -15,22 +15,27 @@ from codriver.signals.signal import Array
 Matrix = list[list[Scalar]]
 
 
-def predict_covariance(P: Matrix, F: Array, Q: Array) -> Matrix:
+def predict_covariance(P: Matrix, F: Array | Matrix, Q: Array | Matrix) -> Matrix:
     """F P F' + Q, by its upper triangle.
 
     Args:
         P: symmetric, n x n scalars.
-        F, Q: numbers, n x n.
+        F, Q: n x n, numbers or scalars.
     """
     n = len(P)
-    FP = [[_dot([(F[i, k], P[k][j]) for k in range(n)]) for j in range(n)] for i in range(n)]
+    FP = [[_dot([(F[i][k], P[k][j]) for k in range(n)]) for j in range(n)] for i in range(n)]
     return symmetric(
-        [[_dot([(F[j, k], FP[i][k]) for k in range(n)]) + _number(Q[i, j]) for j in range(n)] for i in range(n)]
+        [[_dot([(F[j][k], FP[i][k]) for k in range(n)]) + _plain(Q[i][j]) for j in range(n)] for i in range(n)]
     )
 
 
+def predict_mean(x: Sequence[Scalar], F: Array | Matrix) -> list[Scalar]:
+    """F x, for F of numbers or scalars."""
+    return [_dot([(F[i][k], x[k]) for k in range(len(x))]) for i in range(len(x))]
+
+
 def update_row(
-    x: Sequence[Scalar], P: Matrix, h: Sequence[float], innovation: Scalar, R: Scalar, ok: Scalar
+    x: Sequence[Scalar], P: Matrix, h: Sequence[Scalar], innovation: Scalar, R: Scalar, ok: Scalar
 ) -> tuple[list[Scalar], Matrix, Scalar]:
     """Update with one measured row where ok is 1; without it, nothing changes.
 
@@ -38,7 +43,7 @@ def update_row(
 
     Args:
         x, P: predicted state and covariance.
-        h: the row of C, numbers.
+        h: the row of C, numbers or scalars.
         innovation: e = y - h x - d u; 0 where the row is missing.
         R: noise variance of the row.
         ok: 1 where the row is there, else 0.
@@ -64,16 +69,18 @@ def symmetric(M: Matrix) -> Matrix:
     return [[M[min(i, j)][max(i, j)] for j in range(len(M))] for i in range(len(M))]
 
 
-def _dot(pairs: list[tuple[float, Scalar]]) -> Scalar:
-    """Sum of number times scalar; zeros left out and ones not multiplied."""
-    total: Scalar = 0.0
-    for number, scalar in pairs:
+def _dot(pairs: list[tuple[Scalar, Scalar]]) -> Scalar:
+    """Sum of factor times scalar; factors that are the numbers 0 or 1 cost nothing."""
+    total: Scalar = None
+    for factor, scalar in pairs:
+        number = float(factor) if isinstance(factor, (int, float)) else None  # a symbol (LPV, EKF) is no number
         if number == 0:
             continue
-        term = scalar if number == 1 else float(number) * scalar
-        total = term if isinstance(total, float) and total == 0.0 else total + term
-    return total
+        term = scalar if number == 1 else (factor if number is None else number) * scalar
+        total = term if total is None else total + term
+    return 0.0 if total is None else total
 
 
-def _number(x: float) -> float:
-    return float(x)
+def _plain(x: Scalar) -> Scalar:
+    """A Python float instead of a numpy one, which CasADi would take for a matrix; symbols as they are."""
+    return float(x) if isinstance(x, (int, float)) else x

@@ -4,16 +4,18 @@
     update    e1 = y1 - (a_i + o_a + u),  e2 = y2 - v,  each row when it is fresh:  x = x- + K e
 
 Kalman form: P is carried and K follows from it, so rows at different rates and holes are exact. Constant form: K is the
-stationary gain (the papers'), a row that is missing brings no correction. When nothing is missing, both are the same.
-(Where rows are missing most of the time, the constant form is not stable: docs/sampling.md.)
-The known input is taken straight between ticks.
+stationary gain (the papers'), and an innovation after n ticks without that row counts n times (up to where n K_vv is
+0.77), as it stands for n ticks: without that the form is unstable when the speed comes on every eighth tick or more
+rarely. When nothing is missing, both are the same. The known input is taken straight between ticks.
 
 Outside the model:
 * start: the first speed sets v; a_i = j_i = 0; the first accelerometer value sets o_a; the covariance starts wide.
 * standstill (speed below 0.3 m/s, left above 0.5 m/s): the driver's brake force is met by the road, the model does not
   hold. a_i and j_i are 0 by definition, u is not used, o_a follows the accelerometer.
-* `valid` is 1 where the car moves faster than 1 m/s, the inputs are known, and the jerk's standard deviation is at most
-  1.5 times its stationary value: not in the first seconds, nor in a long gap.
+* inputs missing: u is 0, and what it was is anybody's guess, so the covariance of a_i and j_i goes back to its wide start.
+* `valid` is 1 where the car moves faster than 1 m/s, the inputs are known, and the estimate has settled: the jerk's
+  variance is at most 2.25 times the stationary one (Kalman), or the last start, loss of inputs or gap of over 0.5 s in a
+  row is three time constants past (constant). The noise scale learns only then.
 
 Bisoffi et al. 2017, eq. (14)-(18).
 """
@@ -22,17 +24,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from codriver.kernel import Scalar, both, negate, select, sqrt
+from codriver.kernel import Scalar, both, either, minimum, negate, select, sqrt
 from codriver.models import intention_model
 from codriver.observers import noise_scale
 from codriver.observers.covariance import Matrix, predict_covariance, update_row
 from codriver.observers.observer import Observer, Output, Scalars
+from codriver.observers.response import delay
 from codriver.observers.scaled_gain import ScaledGain
 
 STATES = ("speed", "acceleration", "offset", "jerk")
 STANDSTILL_BELOW, STANDSTILL_ABOVE = 0.3, 0.5
 SLOW = 1.0
 WIDE_START = 25.0  # the covariance starts this many times the stationary one
+GAP = 0.5  # s without a row after which the constant form is not trusted
+LARGEST_GAIN = 0.77  # bound of n K_vv in the constant form
 SETTLED = 2.25  # valid while the jerk's variance is at most this many times the stationary one
 _PAIRS = [(i, j) for i in range(4) for j in range(i, 4)]
 
@@ -51,6 +56,8 @@ def jerk_observer(design: ScaledGain, form: str, outputs: tuple[Output, ...], na
     C, rows = intention_model().C, ("acceleration", "speed")
     # How long the constant form needs until its slowest error is down to 5 %.
     settle = 3.0 / design.certificate.decay_rate
+    most = max(int(LARGEST_GAIN / float(design.K[0, 1])), 1)  # ticks that one innovation may stand for
+    wide = [[WIDE_START * float(P_stationary[i, j]) if i == j else 0.0 for j in range(4)] for i in range(4)]
 
     def step(carry: Scalars, u: Scalars, y: Scalars, ok: Scalars, rho: Scalars) -> tuple[Scalars, Scalars]:
         known, direction = u["known_input"], u["direction"]
@@ -69,7 +76,6 @@ def jerk_observer(design: ScaledGain, form: str, outputs: tuple[Output, ...], na
             for value, old in zip([y_v, 0.0, select(ok_a, y_a - known, 0.0), 0.0], x, strict=True)
         ]
         if kalman:
-            wide = [[WIDE_START * P_stationary[i, j] if i == j else 0.0 for j in range(4)] for i in range(4)]
             P = [[select(first, wide[i][j], P[i][j]) for j in range(4)] for i in range(4)]
 
         use_a, use_v = both(ok_a, started), both(ok_v, started)
@@ -81,26 +87,40 @@ def jerk_observer(design: ScaledGain, form: str, outputs: tuple[Output, ...], na
             x, P, s_v = update_row(x, P, C[1], e_v, design.Rd[1, 1], use_v)
         else:
             e_a, e_v = select(use_a, y_a - predicted_a, 0.0), select(use_v, y_v - x[0], 0.0)
-            x = [x[i] + (float(design.K[i, 0]) * e_a + float(design.K[i, 1]) * e_v) for i in range(4)]
+            times_a, times_v = (minimum(carry[f"ticks_{row}"] + 1.0, float(most)) for row in rows)
+            K = design.K
+            x = [x[i] + (float(K[i, 0]) * (times_a * e_a) + float(K[i, 1]) * (times_v * e_v)) for i in range(4)]
             S = C @ design.P_predicted @ C.T + design.Rd
             s_a, s_v = float(S[0, 0]), float(S[1, 1])
         x = [x[0], select(standing, 0.0, x[1]), x[2], select(standing, 0.0, x[3])]
+        lost = both(negate(u["inputs_known"]), negate(standing))
         if kalman:
-            P = _forget_motion(P, standing, P_stationary)
+            P = _forget_motion(P, standing, np.diag(np.diag(P_stationary)).tolist())
+            P = _forget_motion(P, lost, wide)
+            memory = {f"P_{STATES[i]}_{STATES[j]}": P[i][j] for i, j in _PAIRS}
+            variances = [P[i][i] for i in range(4)]
+            settled = P[3][3] <= SETTLED * float(P_stationary[3, 3])
+        else:
+            memory = {
+                f"ticks_{row}": select(use, 0.0, carry[f"ticks_{row}"] + 1.0)
+                for row, use in zip(rows, (use_a, use_v), strict=True)
+            }
+            gap = either(*(memory[f"ticks_{row}"] > GAP / design.dt for row in rows))
+            memory["since_start"] = select(
+                either(negate(started), either(lost, gap)), 0.0, carry["since_start"] + design.dt
+            )
+            variances = [float(P_stationary[i, i]) for i in range(4)]
+            settled = memory["since_start"] >= settle
 
         moving = both(started, negate(standing))
         innovations = {"acceleration": (e_a, s_a, use_a), "speed": (e_v, s_v, use_v)}
-        scale_new, scale = noise_scale.learn(carry, innovations, moving, design.dt, 1.0 / design.ell)
+        counts = both(moving, settled)
+        scale_new, scale = noise_scale.learn(carry, innovations, counts, design.dt, 1.0 / design.ell)
         v_size = select(x[0] < 0, -x[0], x[0])
-        since = select(started, carry["since_start"] + design.dt, 0.0)
-        variances = [P[i][i] if kalman else float(P_stationary[i, i]) for i in range(4)]
-        settled = P[3][3] <= SETTLED * float(P_stationary[3, 3]) if kalman else since >= settle
         valid = both(both(moving, v_size >= SLOW), both(u["inputs_known"], settled))
         new = {
-            "started": started, "standing": standing, "since_start": since, "input_before": known,
-            **{f"x_{state}": value for state, value in zip(STATES, x, strict=True)},
-            **({f"P_{STATES[i]}_{STATES[j]}": P[i][j] for i, j in _PAIRS} if kalman else {}),
-            **scale_new,
+            "started": started, "standing": standing, "input_before": known,
+            **{f"x_{state}": value for state, value in zip(STATES, x, strict=True)}, **memory, **scale_new,
         }  # fmt: skip
         out = {output.name: value for output, value in zip(outputs, x, strict=True)}
         out |= {f"{o.name}_sd": sqrt(scale * variance) for o, variance in zip(outputs, variances, strict=True)}
@@ -111,15 +131,17 @@ def jerk_observer(design: ScaledGain, form: str, outputs: tuple[Output, ...], na
         }  # fmt: skip
         return new, out
 
-    carry = {"started": 0.0, "standing": 0.0, "since_start": 0.0, "input_before": 0.0}
+    carry = {"started": 0.0, "standing": 0.0, "input_before": 0.0}
     carry |= {f"x_{state}": 0.0 for state in STATES}
     if kalman:
         carry |= {f"P_{STATES[i]}_{STATES[j]}": float(design.P[i, j]) for i, j in _PAIRS}
+    else:
+        carry |= {**{f"ticks_{row}": 0.0 for row in rows}, "since_start": 0.0}
     carry |= noise_scale.initial()
     return Observer(
         name, design.dt, ("known_input", "direction", "inputs_known"),
         ("longitudinal_acceleration", "longitudinal_speed"), carry, (*outputs, *_more_outputs(outputs, rows)), step,
-        settings={"form": form, "ell": design.ell, "dt": design.dt},
+        settings={"form": form, "ell": design.ell, "dt": design.dt, "delay_s": round(delay(design), 6)},
         gains={"L_K": design.L_K, "L": design.L, "K": design.K, "P": design.P, "Q_ell": design.Q, "R_ell": design.R},
         certificate=design.certificate,
     )  # fmt: skip
@@ -147,13 +169,11 @@ def _predict(carry: Scalars, design: ScaledGain, known: Scalar, kalman: bool) ->
     return predicted, predict_covariance(P, F, design.Qd)
 
 
-def _forget_motion(P: Matrix, standing: Scalar, stationary: np.ndarray) -> Matrix:
-    """While standing, acceleration and jerk are 0; when the vehicle leaves they are as uncertain as ever."""
+def _forget_motion(P: Matrix, when: Scalar, fresh: Matrix) -> Matrix:
+    """What is known of acceleration and jerk is forgotten: their entries are those of `fresh`, the others stay."""
 
     def entry(i: int, j: int) -> Scalar:
-        if i in (1, 3) or j in (1, 3):
-            return select(standing, float(stationary[i, i]) if i == j else 0.0, P[i][j])
-        return P[i][j]
+        return select(when, fresh[i][j], P[i][j]) if i in (1, 3) or j in (1, 3) else P[i][j]
 
     return [[entry(i, j) for j in range(4)] for i in range(4)]
 

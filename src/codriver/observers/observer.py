@@ -4,6 +4,7 @@
 
 on mappings of names to scalars. `u` are inputs held from the newest sample, `y` measurements that are used on the tick they
 arrive, `rho` scheduling signals (held too), `ok[name]` is 1 where the input is held or the measurement is fresh, else 0.
+For a signal in both roles `ok[name]` says fresh and `ok[name + "_held"]` says held.
 The step never looks at a value whose ok is 0. Batch, live and exported C are loops around this one step.
 """
 
@@ -11,12 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from codriver.errors import DesignError
 from codriver.kernel import Recorded, Scalar, record
+from codriver.signals import Grid
+from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
 
 Scalars = dict[str, Scalar]
@@ -39,6 +43,14 @@ class Output:
     unit: str
     role: str
     meaning: str = ""
+
+
+class Flag(NamedTuple):
+    """A recorded flag: its name, its channel, and whether it says "fresh" or "held"."""
+
+    name: str
+    channel: str
+    kind: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +107,23 @@ class Observer:
     @property
     def channels(self) -> tuple[str, ...]:
         """All signals the step takes, in the order of the recorded inputs."""
-        return (*self.inputs, *(m for m in self.measured if m not in self.inputs), *self.scheduling)
+        return tuple(dict.fromkeys((*self.inputs, *self.measured, *self.scheduling)))
+
+    @property
+    def flags(self) -> tuple[Flag, ...]:
+        """The recorded flags, in order: "<channel>_ok", or "_fresh" and "_held" where a channel has both roles."""
+        held = {*self.inputs, *self.scheduling}
+        found = []
+        for name in self.channels:
+            if name in self.measured and name in held:
+                found += [Flag(f"{name}_fresh", name, "fresh"), Flag(f"{name}_held", name, "held")]
+            else:
+                found.append(Flag(f"{name}_ok", name, "fresh" if name in self.measured else "held"))
+        return tuple(found)
+
+    def flag_columns(self, grid: Grid) -> list[Flags]:
+        """The grid's flags in the order of `flags`."""
+        return [(grid.fresh if flag.kind == "fresh" else grid.held)[flag.channel] for flag in self.flags]
 
     @property
     def required(self) -> tuple[str, ...]:
@@ -103,14 +131,14 @@ class Observer:
         return tuple(name for name in self.channels if name not in self.optional)
 
     def record(self, outputs: tuple[str, ...] | None = None) -> Recorded:
-        """The step as straight-line code; inputs are the channels, then their ok flags as "<channel>_ok".
+        """The step as straight-line code; inputs are the channels, then the flags.
 
         Args:
             outputs: names of the outputs wanted; None keeps all. What no wanted output or carry needs is not recorded.
         """
 
         def flat(carry: Scalars, given: Scalars) -> tuple[Scalars, Scalars]:
-            ok = {name: given[f"{name}_ok"] for name in self.channels}
+            ok = {f.name if f.name.endswith("_held") else f.channel: given[f.name] for f in self.flags}
             new, out = self.step(
                 carry,
                 {name: given[name] for name in self.inputs},
@@ -120,7 +148,7 @@ class Observer:
             )
             return new, {o.name: out[o.name] for o in self.outputs if outputs is None or o.name in outputs}
 
-        flags = [f"{name}_ok" for name in self.channels]
+        flags = [flag.name for flag in self.flags]
         name = self.name.replace("-", "_")
         return record(name, flat, list(self.carry), [*self.channels, *flags], flags)
 
@@ -145,9 +173,9 @@ def chain(first: Observer, second: Observer, name: str | None = None) -> Observe
     scheduling = (*first.scheduling, *(n for n in second.scheduling if n not in wired and n not in first.scheduling))
 
     def step(carry: Scalars, u: Scalars, y: Scalars, ok: Scalars, rho: Scalars) -> tuple[Scalars, Scalars]:
-        new1, out1 = first.step({key: carry[key] for key in first.carry}, u, y, ok, rho)
+        new1, out1 = first.step({key: carry[key] for key in first.carry}, u, y, _as_seen_by(first, ok), rho)
         known = {n: out1[n] for n in wired}
-        fine = {**ok, **dict.fromkeys(wired, 1.0)}
+        fine = {**_as_seen_by(second, ok), **dict.fromkeys(wired, 1.0)}
         new2, out2 = second.step({key: carry[key] for key in second.carry}, {**u, **known}, y, fine, {**rho, **known})
         return {**new1, **new2}, {**out1, **out2}
 
@@ -159,6 +187,14 @@ def chain(first: Observer, second: Observer, name: str | None = None) -> Observe
         (*(o for o in first.outputs if o.name not in replaced), *second.outputs), step, scheduling, frozenset(optional),
         {**first.settings, **second.settings}, {**first.gains, **second.gains}, second.certificate or first.certificate,
     )  # fmt: skip
+
+
+def _as_seen_by(part: Observer, ok: Scalars) -> Scalars:
+    """The flags of a chain as one part expects them: a signal that it only holds, another may measure."""
+    return {
+        **ok,
+        **{name: ok[f"{name}_held"] for name in part.channels if name not in part.measured and f"{name}_held" in ok},
+    }
 
 
 def stable(eigenvalues: npt.NDArray[np.complex128]) -> bool:

@@ -1,7 +1,7 @@
 """What the powertrain does, from gear, clutch and brake: the part that all estimators with a vehicle share.
 
-* gear: tau comes from the gear's entry in the vehicle file. Neutral or an unknown gear passes no torque, and the intention
-  keeps the tau of the gear engaged last, until another engages.
+* gear: tau comes from the gear's entry in the vehicle file. Neutral passes no torque, and the intention keeps the tau of the
+  gear engaged last, until another engages. A gear that the vehicle file lacks passes a torque that nobody knows.
 * clutch: with the clutch open tau T_e reaches no wheel and is cut; half open, half of it.
 * shift: 1 while the clutch is not closed, and for 0.5 s after the gear changed where there is no clutch signal.
 * brake: sigma is 1 from the brake pressure's threshold on, until it is down to half of it; or while the brake switch is on.
@@ -21,7 +21,7 @@ SHIFT_SECONDS = 0.5
 OPEN_CLUTCH = 0.05
 PEDAL_PRESSED = 0.02
 
-CARRY = {"tau": 0.0, "gear_before": 0.0, "since_shift": SHIFT_SECONDS, "sigma_before": 0.0}
+CARRY = {"tau": 0.0, "gear_before": 0.0, "since_shift": SHIFT_SECONDS, "pressed_before": 0.0}
 FLAGS = (
     Output("direction", "1", "input", "1 forward, -1 reverse"),
     Output("inputs_known", "1", "flag", "1 where all inputs of the model are there"),
@@ -41,7 +41,7 @@ class Powertrain:
         direction: 1 or -1.
         sigma: 1 while the driver brakes.
         shifting: 1 while a shift goes on.
-        known: 1 where tau is known.
+        known: 1 where tau is known: in a gear of the vehicle file, or in neutral after one.
         carry: the new carried scalars.
     """
 
@@ -76,9 +76,11 @@ def powertrain(vehicle: Vehicle, dt: float, carry: Scalars, u: Scalars, ok: Scal
     # Half a tick early, so that rounding does not decide where the time is a whole number of ticks.
     shifting = select(ok["clutch"], open_share > OPEN_CLUTCH, since < SHIFT_SECONDS - dt / 2)
 
-    sigma = _sigma(vehicle, carry["sigma_before"], u, ok)
-    new = {"tau": tau, "gear_before": gear, "since_shift": since, "sigma_before": sigma}
-    return Powertrain(tau, passing, select(gear < 0, -1.0, 1.0), sigma, shifting, negate(tau == 0), new)
+    pressed = _pressed(vehicle, carry["pressed_before"], u, ok)
+    sigma = either(pressed, select(ok["brake_switch"], u["brake_switch"] > 0.5, 0.0))
+    new = {"tau": tau, "gear_before": gear, "since_shift": since, "pressed_before": pressed}
+    known = both(negate(tau == 0), either(engaged, gear == 0))
+    return Powertrain(tau, passing, select(gear < 0, -1.0, 1.0), sigma, shifting, known, new)
 
 
 def _gear(ratios: tuple[float, ...], u: Scalars, ok: Scalars) -> Scalar:
@@ -86,9 +88,8 @@ def _gear(ratios: tuple[float, ...], u: Scalars, ok: Scalars) -> Scalar:
     return select(ok["gear"], u["gear"], 1.0 if len(ratios) == 1 else 0.0)
 
 
-def _sigma(vehicle: Vehicle, before: Scalar, u: Scalars, ok: Scalars) -> Scalar:
-    """Whether the driver brakes: pressure with hysteresis, or the switch."""
+def _pressed(vehicle: Vehicle, before: Scalar, u: Scalars, ok: Scalars) -> Scalar:
+    """Whether the pressure says that the driver brakes, with hysteresis (the switch must not latch it)."""
     on = vehicle.number("brake_threshold") if "brake_threshold" in vehicle else DEFAULT_BRAKE_THRESHOLD
     pressure = select(ok["brake_pressure"], u["brake_pressure"], 0.0)
-    pressed = pressure > select(before, on / 2, on)
-    return either(pressed, select(ok["brake_switch"], u["brake_switch"] > 0.5, 0.0))
+    return pressure > select(before, on / 2, on)

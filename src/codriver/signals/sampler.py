@@ -113,6 +113,7 @@ class Sampler:
         self._value = {c.name: nan for c in self.channels}
         self._stamp = {c.name: -inf for c in self.channels}
         self._taken = {c.name: -inf for c in self.channels}
+        self._tick: float | None = None
         self._waiting: dict[str, list[tuple[float, float]]] = {c.name: [] for c in self.channels}
 
     def push(self, name: str, time: float, value: float) -> None:
@@ -124,6 +125,9 @@ class Sampler:
         """Values, fresh flags and held flags at a tick, by channel name."""
         fresh: dict[str, bool] = {}
         held: dict[str, bool] = {}
+        # The tick before, as it was given: tick - dt would round otherwise than the batch's own ticks do.
+        previous = tick - self.dt if self._tick is None else self._tick
+        self._tick = tick
         for channel in self.channels:
             name = channel.name
             later = []
@@ -133,7 +137,7 @@ class Sampler:
                 elif stamp >= self._stamp[name]:
                     self._stamp[name], self._value[name] = stamp, value
             self._waiting[name] = later
-            fresh[name] = self._stamp[name] > max(self._taken[name], tick - self.dt + TOLERANCE)
+            fresh[name] = self._stamp[name] > max(self._taken[name], previous + TOLERANCE)
             self._taken[name] = max(self._taken[name], self._stamp[name])
             held[name] = tick - self._stamp[name] <= channel.hold and self._stamp[name] > -inf
         return dict(self._value), fresh, held

@@ -49,13 +49,14 @@ def check_observer(observer: Observer, rows: int = 200) -> None:
     program = compile(observer)
     grid = golden_inputs(program, rows)
     batch = program.run_grid(grid)
-    measured = set(observer.measured)
+    flags = observer.flag_columns(grid)
     stepper, carry = program.live(), dict(observer.carry)
     resumed = program.live()
     for k in range(rows):
-        ok = [bool((grid.fresh if n in measured else grid.held)[n][k]) for n in observer.channels]
+        ok = [bool(column[k]) for column in flags]
         values = [float(grid.values[n][k]) for n in observer.channels]
-        hidden = [v if there else math.nan for v, there in zip(values, ok, strict=True)]
+        seen = {flag.channel for flag, there in zip(observer.flags, ok, strict=True) if there}
+        hidden = [v if n in seen else math.nan for n, v in zip(observer.channels, values, strict=True)]
         live = stepper([*hidden, *ok])
         inputs = dict(zip(program.recorded.inputs, [*values, *map(float, ok)], strict=True))
         new, out = interpret(program.recorded, carry, inputs)
