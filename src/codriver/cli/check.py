@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-app = typer.Typer(help="Check a vehicle file or a names file.", no_args_is_help=True)
+app = typer.Typer(help="Check a vehicle file or a names file.", no_args_is_help=True, rich_markup_mode=None)
 File = Annotated[
     str, typer.Argument(metavar="FILE", help="A TOML file (for vehicles, a built-in name too).", show_default=False)
 ]
@@ -20,7 +20,7 @@ def vehicle(file: File) -> None:
     from rich.table import Table
 
     from codriver.cli.terminal import console
-    from codriver.observers.intent import ESTIMATORS
+    from codriver.observers import ESTIMATORS
     from codriver.vehicles import load_vehicle
     from codriver.vehicles.load import KNOWN
 

@@ -29,7 +29,7 @@ def estimate(
     rate: Annotated[
         float | None, typer.Option("--rate", help="Ticks per second. Default: from the log.", show_default=False)
     ] = None,
-    preset: PresetName = "bisoffi2017",
+    preset: PresetName = None,
     form: Form = "kalman",
     bus: Bus = None,
     report: Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)] = None,
@@ -51,7 +51,7 @@ def estimate_log(
     names: Path | None = None,
     ell: float | None = None,
     rate: float | None = None,
-    preset: str = "bisoffi2017",
+    preset: str | None = None,
     form: str = "kalman",
     bus: int | None = None,
     report: Path | None = None,
@@ -133,14 +133,14 @@ def _refuse_empty(result: Estimate) -> None:
 def _choose(estimator: str, log: Log, vehicle: Vehicle | None) -> tuple[str, str]:
     """The estimator's name, and why it was taken where the log decided."""
     from codriver.observers.feed import best, feeds
-    from codriver.observers.intent import get_estimator
+    from codriver.observers.registry import families, get_estimator
 
-    if estimator != "intent":
+    if estimator not in families():
         return get_estimator(estimator).name, ""
     unusable = [fault for fault in log.faults if fault.endswith("it is left out")]
-    feed = best(log, vehicle, log.source + (f" ({'; '.join(unusable)})" if unusable else ""))
+    feed = best(log, vehicle, log.source + (f" ({'; '.join(unusable)})" if unusable else ""), estimator)
     better = []
-    for other in feeds(log, vehicle):
+    for other in feeds(log, vehicle, estimator):
         if other.estimator == feed.estimator:
             break
         better.append(f"{other.estimator} lacks {other.lacks(vehicle)}")
@@ -148,7 +148,14 @@ def _choose(estimator: str, log: Log, vehicle: Vehicle | None) -> tuple[str, str
 
 
 def run_estimator(
-    name: str, log: Log, vehicle: Vehicle | None, *, ell: float | None, rate: float | None, preset: str, form: str
+    name: str,
+    log: Log,
+    vehicle: Vehicle | None,
+    *,
+    ell: float | None,
+    rate: float | None,
+    preset: str | None,
+    form: str,
 ) -> Estimate:
     """Build, compile and run an estimator at the rate given or the log's."""
     from codriver.observers import build

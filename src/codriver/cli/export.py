@@ -9,7 +9,7 @@ import typer
 
 from codriver.cli.options import Ell, EstimatorName, Form, PresetName, VehicleName
 
-app = typer.Typer(help="Export an estimator for a control unit.", no_args_is_help=True)
+app = typer.Typer(help="Export an estimator for a control unit.", no_args_is_help=True, rich_markup_mode=None)
 
 
 @app.command("c")
@@ -20,20 +20,20 @@ def export_c_files(
     vehicle: VehicleName = None,
     real: Annotated[str, typer.Option("--real", help="double (bit-exact) or float.")] = "double",
     ell: Ell = None,
-    preset: PresetName = "bisoffi2017",
+    preset: PresetName = None,
     form: Form = "kalman",
 ) -> None:
     """Write an estimator as C99: header, source, check program with golden vectors, Makefile, README."""
     from codriver.cli.terminal import console
     from codriver.errors import UsageError
     from codriver.export import export_c
-    from codriver.observers import build
+    from codriver.observers import build, families
     from codriver.program import compile
     from codriver.vehicles import load_vehicle
 
-    if estimator == "intent":
+    if estimator in families():
         raise UsageError(
-            "'intent' stands for whatever a log can feed", "one estimator", "name it, such as intent-pedals"
+            f"'{estimator}' stands for whatever a log can feed", "one estimator", "name it, such as intent-pedals"
         )
     car = load_vehicle(vehicle) if vehicle is not None else None
     observer = build(estimator, car, dt=dt, ell=ell, preset=preset, form=form)

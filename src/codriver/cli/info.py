@@ -17,7 +17,7 @@ def info(
     from codriver.cli.options import check_inputs
     from codriver.logs import open_recording
     from codriver.logs.read import own_names, read_recording
-    from codriver.observers.feed import best, feeds
+    from codriver.observers.feed import best, feeds, least_demanding
     from codriver.signals import Log
     from codriver.vehicles import load_vehicle
 
@@ -31,8 +31,10 @@ def info(
         signals = read_recording(recording, names)
     # Without a vehicle, say what the log alone allows: parameters are told apart from signals.
     found = feeds(signals, car)
-    fed = [f for f in found if not f.missing]
-    choice = best(signals, car).estimator if any(f.possible for f in found) else None
+    family = found[0].family  # the first is what `codriver estimate` is mostly asked for
+    members = [f for f in found if f.family == family]
+    fed = [f for f in members if not f.missing]
+    choice = best(signals, car, family=family).estimator if any(f.possible for f in members) else None
     summary: dict[str, Any] = {
         "log": str(log),
         "format": recording.format,
@@ -50,11 +52,13 @@ def info(
                 "missing_parameters": list(f.lacking),
                 "possible": f.possible,
                 "meaning": f.meaning,
+                "family": f.family,
             }
             for f in found
         ],
         "best": choice,
         "best_with_a_vehicle": fed[0].estimator if fed else None,
+        "least_demanding": least_demanding(family),
         "vehicle": car.name if car is not None else None,
     }
     if json:
@@ -123,9 +127,9 @@ def _show(summary: dict[str, Any]) -> None:
     elif summary["best_with_a_vehicle"]:
         out.print(f"\nbest available with a vehicle file: [bold]{summary['best_with_a_vehicle']}[/]")
     else:
-        least = next(e for e in summary["estimators"] if e["name"] == "kinematic")
+        least = next(e for e in summary["estimators"] if e["name"] == summary["least_demanding"])
         out.print(
-            "\nno estimator can be fed: kinematic, which needs the least, lacks "
+            f"\nno estimator can be fed: {least['name']}, which needs the least, lacks "
             + " and ".join(least["missing_signals"])
         )
 

@@ -30,7 +30,14 @@ Ell = Annotated[
         show_default=False,
     ),
 ]
-PresetName = Annotated[str, typer.Option("--preset", help="Noise of a paper: bisoffi2017 or bisoffi2015.")]
+PresetName = Annotated[
+    str | None,
+    typer.Option(
+        "--preset",
+        help="Noise of a paper. Default: bisoffi2017, for intent-torque too, whose paper's own is --preset bisoffi2015.",
+        show_default=False,
+    ),
+]
 Form = Annotated[str, typer.Option("--form", help="kalman (missing rows exact) or constant (the papers' gain; small).")]
 EstimatorName = Annotated[
     str,

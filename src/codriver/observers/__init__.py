@@ -1,18 +1,26 @@
 """Observers: frozen designs with one step each."""
 
-from codriver.observers.intent import ESTIMATORS, build
+from codriver.observers import intent as _intent  # noqa: F401  registers its family
+from codriver.observers.feed import best, feeds
 from codriver.observers.observer import Certificate, Observer, Output, chain
+from codriver.observers.registry import ESTIMATORS, Design, Estimator, build, families, register
 from codriver.observers.scaled_gain import PRESETS, Preset, ScaledGain, design_scaled_gain
 
 __all__ = [
     "ESTIMATORS",
     "PRESETS",
     "Certificate",
+    "Design",
+    "Estimator",
     "Observer",
     "Output",
     "Preset",
     "ScaledGain",
+    "best",
     "build",
     "chain",
     "design_scaled_gain",
+    "families",
+    "feeds",
+    "register",
 ]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from codriver.errors import MissingSignal
-from codriver.observers.intent import ESTIMATORS, needed_signals
+from codriver.errors import MissingSignal, UsageError
+from codriver.observers.registry import ESTIMATORS, families, needed_signals
 from codriver.signals import Log
 from codriver.vehicles import Vehicle
 
@@ -22,12 +22,14 @@ class Feed:
         missing: standard signals it needs and the log lacks.
         lacking: parameters it needs and the vehicle lacks; all of them where no vehicle was given.
         meaning: what it estimates.
+        family: the estimators it is compared with.
     """
 
     estimator: str
     missing: tuple[str, ...]
     lacking: tuple[str, ...]
     meaning: str
+    family: str
 
     @property
     def possible(self) -> bool:
@@ -40,35 +42,53 @@ class Feed:
         return ", ".join([*self.missing, *wants, *(["a vehicle"] if self.lacking and vehicle is None else [])])
 
 
-def feeds(signals: Collection[str], vehicle: Vehicle | None) -> list[Feed]:
-    """Every estimator, in order of preference, with what stands in its way."""
+def feeds(signals: Collection[str], vehicle: Vehicle | None, family: str | None = None) -> list[Feed]:
+    """Every estimator, or those of one family, in order of preference, with what stands in its way.
+
+    Raises:
+        UsageError: there is no such family.
+    """
+    if family is not None and family not in families():
+        raise UsageError(
+            f"no family of estimators is called '{family}'", f"one of {', '.join(families())}", "choose one"
+        )
     return [
         Feed(
             name,
             tuple(s for s in needed_signals(name, vehicle) if s not in signals),
             tuple(p for p in estimator.parameters if vehicle is None or p not in vehicle),
             estimator.meaning,
+            estimator.family,
         )
         for name, estimator in ESTIMATORS.items()
+        if family is None or estimator.family == family
     ]
 
 
-def best(signals: Collection[str], vehicle: Vehicle | None, where: str = "the log") -> Feed:
-    """The best estimator that can be fed.
+def best(signals: Collection[str], vehicle: Vehicle | None, where: str = "the log", family: str = "intent") -> Feed:
+    """The best estimator of a family that can be fed.
 
     Raises:
         MissingSignal: none can; the message says what each lacks.
+        UsageError: there is no such family.
     """
-    found = feeds(signals, vehicle)
+    found = feeds(signals, vehicle, family)
     for feed in found:
         if feed.possible:
             return feed
     lacks = "; ".join(f"{f.estimator} lacks {f.lacks(vehicle)}" for f in found)
+    least = least_demanding(family)
     raise MissingSignal(
         f"{where} feeds no estimator: {lacks}",
-        "at least longitudinal_acceleration and longitudinal_speed (kinematic)",
+        f"at least {' and '.join(ESTIMATORS[least].signals)} ({least})",
         "map more signals in a names file; `codriver info LOG` lists the channels of the log",
     )
+
+
+def least_demanding(family: str) -> str:
+    """The estimator of a family that needs the fewest vehicle parameters, and then the fewest signals."""
+    members = [estimator for estimator in ESTIMATORS.values() if estimator.family == family]
+    return min(members, key=lambda e: (len(e.parameters), len(e.signals))).name
 
 
 def suggest_rate(log: Log, names: Collection[str]) -> float:

@@ -1,4 +1,4 @@
-"""The four estimators of the longitudinal intention, by name.
+"""The four estimators of the longitudinal intention: the family `intent`, in order of preference.
 
 | name          | known input                                   | needs a vehicle |
 |---------------|-----------------------------------------------|-----------------|
@@ -6,21 +6,23 @@
 | intent-torque | requested and actual torque, gear             | yes             |
 | kinematic     | none: the vehicle's own jerk                  | no              |
 | pedals-only   | pedals and gear, no observer                  | yes             |
+
+The three with an observer take the noise of the 2017 paper. `intent-torque` is of the 2015 paper; the preset "bisoffi2015"
+gives that paper's noise and ell.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from codriver.errors import UsageError, VehicleError
-from codriver.names import nearest
 from codriver.observers import known_input
 from codriver.observers.jerk import jerk_observer
 from codriver.observers.observer import Observer, Output, chain
 from codriver.observers.pedals_only import pedals_only
-from codriver.observers.scaled_gain import PRESETS, Preset, check_tick, design_scaled_gain
+from codriver.observers.registry import Design, Estimator, register
+from codriver.observers.scaled_gain import design_scaled_gain
 from codriver.vehicles import Vehicle
 
+FAMILY = "intent"
+DEFAULT_PRESET = "bisoffi2017"
 _SPEED = Output("longitudinal_speed", "m/s", "estimate", "v")
 _OFFSET = Output("acceleration_offset", "m/s^2", "estimate", "o_a = g sin(slope) + accelerometer bias")
 INTENTION = (
@@ -37,123 +39,50 @@ MOTION = (
 )
 
 
-@dataclass(frozen=True)
-class Estimator:
-    """What is to be known of an estimator before it is built.
-
-    Attributes:
-        name: as on the command line.
-        parameters: the vehicle parameters it needs; none means it needs no vehicle.
-        signals: the signals it needs (beside optional ones).
-        meaning: one sentence.
-    """
-
-    name: str
-    parameters: tuple[str, ...]
-    signals: tuple[str, ...]
-    meaning: str
+def _with_observer(front: Observer, design: Design, outputs: tuple[Output, ...]) -> Observer:
+    """A known input, and the observer that takes it."""
+    gains = design_scaled_gain(design.preset or DEFAULT_PRESET, design.dt, design.ell)
+    return chain(front, jerk_observer(gains, design.form, outputs))
 
 
-# In order of preference: `intent` takes the first that a log and a vehicle can feed.
-ESTIMATORS: dict[str, Estimator] = {
-    e.name: e
-    for e in (
-        Estimator(
-            "intent-pedals", ("mass", "transmission", "pedal_coefficient", "brake_coefficient"),
-            ("accelerator_pedal", "brake_pressure", "engine_torque", "gear", "longitudinal_acceleration", "longitudinal_speed"),
-            "intentional acceleration and jerk from pedals, torque, accelerometer and speed (2017)",
-        ),
-        Estimator(
-            "intent-torque", ("mass", "transmission"),
-            ("engine_torque_request", "engine_torque", "gear", "longitudinal_acceleration", "longitudinal_speed"),
-            "intentional acceleration and jerk from requested and actual torque, accelerometer and speed (2015)",
-        ),
-        Estimator(
-            "kinematic", (), ("longitudinal_acceleration", "longitudinal_speed"),
-            "the vehicle's own acceleration and jerk, whoever caused them",
-        ),
-        Estimator(
-            "pedals-only", ("mass", "transmission", "pedal_coefficient", "brake_coefficient"),
-            ("accelerator_pedal", "brake_pressure", "gear"), "pedals turned into acceleration and jerk, without an observer",
-        ),
-    )
-}  # fmt: skip
+def _intent_pedals(vehicle: Vehicle | None, design: Design) -> Observer:
+    assert vehicle is not None  # the registry saw to it, for the estimator has parameters
+    return _with_observer(known_input.from_pedals(vehicle, design.dt), design, INTENTION)
 
 
-def needed_signals(name: str, vehicle: Vehicle | None) -> tuple[str, ...]:
-    """The signals an estimator needs with this vehicle; a car of one gear does not need the gear."""
-    estimator = get_estimator(name)
-    one_gear = vehicle is not None and "transmission" in vehicle and len(vehicle.numbers("transmission")) == 1
-    return tuple(s for s in estimator.signals if s != "gear" or name != "intent-torque" or not one_gear)
+def _intent_torque(vehicle: Vehicle | None, design: Design) -> Observer:
+    assert vehicle is not None
+    return _with_observer(known_input.from_torque(vehicle, design.dt), design, INTENTION)
 
 
-def get_estimator(name: str) -> Estimator:
-    """The entry of ESTIMATORS.
-
-    Raises:
-        UsageError: there is no such estimator.
-    """
-    if name not in ESTIMATORS:
-        near = nearest(name, [*ESTIMATORS, "intent"])
-        raise UsageError(
-            f"no estimator is called '{name}'", f"one of {', '.join(ESTIMATORS)}, or intent",
-            f"did you mean {near}?" if near else "see `codriver estimate --help`",
-        )  # fmt: skip
-    return ESTIMATORS[name]
+def _kinematic(vehicle: Vehicle | None, design: Design) -> Observer:
+    return _with_observer(known_input.kinematic(design.dt), design, MOTION)
 
 
-def build(
-    name: str,
-    vehicle: Vehicle | None = None,
-    *,
-    dt: float = 0.01,
-    ell: float | None = None,
-    preset: str | Preset = "bisoffi2017",
-    form: str = "kalman",
-) -> Observer:
-    """Build an estimator.
-
-    Args:
-        name: one of ESTIMATORS.
-        vehicle: not needed by `kinematic`.
-        dt: tick, s.
-        ell: the knob; None takes the preset's (2 for 2017, 1.4 for 2015).
-        preset: noise of a paper, or one's own.
-        form: "kalman" (missing and multi-rate rows exact) or "constant" (the papers' gain; small).
-
-    Raises:
-        UsageError: no such estimator, preset or form; dt or ell not positive.
-        VehicleError: the vehicle is missing, or lacks a parameter.
-        DesignError: the design fails its certificate.
-    """
-    estimator = get_estimator(name)
-    check_tick(dt)
-    if form not in ("kalman", "constant"):
-        raise UsageError(f"form '{form}'", "'kalman' or 'constant'", "choose one")
-    if estimator.parameters and vehicle is None:
-        raise VehicleError(
-            f"{name} was given no vehicle", f"one with {', '.join(estimator.parameters)}",
-            "give a built-in name or a vehicle file (--vehicle), or use the estimator 'kinematic', which needs none",
-        )  # fmt: skip
-    if name == "pedals-only":
-        assert vehicle is not None
-        return pedals_only(vehicle, dt)
-    design = design_scaled_gain(preset, dt, ell)
-    label = preset if isinstance(preset, str) else "own"
-    if name == "kinematic":
-        front, outputs = known_input.kinematic(dt), MOTION
-    else:
-        assert vehicle is not None
-        front = (
-            known_input.from_pedals(vehicle, dt) if name == "intent-pedals" else known_input.from_torque(vehicle, dt)
-        )
-        outputs = INTENTION
-    observer = chain(front, jerk_observer(design, form, outputs), name)
-    settings = {"estimator": name, **observer.settings, "preset": label}
-    return Observer(
-        name, dt, observer.inputs, observer.measured, observer.carry, observer.outputs, observer.step,
-        observer.scheduling, observer.optional, settings, observer.gains, observer.certificate,
-    )  # fmt: skip
+def _pedals_only(vehicle: Vehicle | None, design: Design) -> Observer:
+    assert vehicle is not None
+    return pedals_only(vehicle, design.dt)
 
 
-__all__ = ["ESTIMATORS", "PRESETS", "Estimator", "build", "get_estimator", "needed_signals"]
+register(Estimator(
+    "intent-pedals", ("mass", "transmission", "pedal_coefficient", "brake_coefficient"),
+    ("accelerator_pedal", "brake_pressure", "engine_torque", "gear", "longitudinal_acceleration", "longitudinal_speed"),
+    "intentional acceleration and jerk from pedals, torque, accelerometer and speed (2017)",
+    FAMILY, _intent_pedals, DEFAULT_PRESET, knob=True,
+))  # fmt: skip
+register(Estimator(
+    "intent-torque", ("mass", "transmission"),
+    ("engine_torque_request", "engine_torque", "gear", "longitudinal_acceleration", "longitudinal_speed"),
+    "intentional acceleration and jerk from requested and actual torque, accelerometer and speed (2015)",
+    FAMILY, _intent_torque, DEFAULT_PRESET, knob=True,
+))  # fmt: skip
+register(Estimator(
+    "kinematic", (), ("longitudinal_acceleration", "longitudinal_speed"),
+    "the vehicle's own acceleration and jerk, whoever caused them",
+    FAMILY, _kinematic, DEFAULT_PRESET, knob=True,
+))  # fmt: skip
+register(Estimator(
+    "pedals-only", ("mass", "transmission", "pedal_coefficient", "brake_coefficient"),
+    ("accelerator_pedal", "brake_pressure", "gear"), "pedals turned into acceleration and jerk, without an observer",
+    FAMILY, _pedals_only,
+))  # fmt: skip

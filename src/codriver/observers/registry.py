@@ -1,0 +1,155 @@
+"""The estimators by name: what is to be known of each before it is built, and how it is built.
+
+    from codriver.observers import Estimator, register
+    register(Estimator("driver-torque", ..., family="torque", build=my_function))
+
+A family is a set of estimators of the same quantity, in order of preference. Its name stands for the best of them that a
+log and a vehicle can feed (`feed.best`). Each module of estimators registers its own; the order of registering is the order
+of preference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from codriver.errors import UsageError, VehicleError
+from codriver.names import nearest
+from codriver.observers.observer import Observer
+from codriver.observers.scaled_gain import Preset, check_tick
+from codriver.vehicles import Vehicle
+
+ESTIMATORS: dict[str, Estimator] = {}
+
+
+@dataclass(frozen=True)
+class Design:
+    """What an estimator is to be designed for.
+
+    Attributes:
+        dt: tick, s.
+        ell: the knob; None takes the preset's.
+        preset: noise, by the name of a paper's or one's own; None where the estimator has none.
+        form: "kalman" or "constant", where the estimator has both.
+    """
+
+    dt: float = 0.01
+    ell: float | None = None
+    preset: str | Preset | None = None
+    form: str = "kalman"
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """What is to be known of an estimator before it is built.
+
+    Attributes:
+        name: as on the command line.
+        parameters: the vehicle parameters it needs; none means it needs no vehicle.
+        signals: the signals it needs (beside optional ones), as far as that can be said without a vehicle.
+        meaning: what it estimates from what; a sentence without its full stop.
+        family: of the estimators of the same quantity.
+        build: makes the observer. It gets a vehicle with `parameters` if there are any, else perhaps None.
+        preset: the noise it takes by default; None: it has no noise to choose.
+        knob: whether it has ell.
+    """
+
+    name: str
+    parameters: tuple[str, ...]
+    signals: tuple[str, ...]
+    meaning: str
+    family: str
+    build: Callable[[Vehicle | None, Design], Observer]
+    preset: str | None = None
+    knob: bool = False
+
+
+def register(estimator: Estimator) -> Estimator:
+    """Add an estimator, after those of its family that are there.
+
+    Raises:
+        UsageError: its name is taken, by an estimator or a family.
+    """
+    if estimator.name in ESTIMATORS or estimator.name in families() or estimator.family in ESTIMATORS:
+        raise UsageError(
+            f"an estimator '{estimator.name}' of the family '{estimator.family}'", "names that are free", "rename it"
+        )
+    ESTIMATORS[estimator.name] = estimator
+    return estimator
+
+
+def families() -> tuple[str, ...]:
+    """The families, in the order they were registered."""
+    return tuple(dict.fromkeys(estimator.family for estimator in ESTIMATORS.values()))
+
+
+def get_estimator(name: str) -> Estimator:
+    """The entry of ESTIMATORS.
+
+    Raises:
+        UsageError: there is no such estimator.
+    """
+    if name not in ESTIMATORS:
+        near = nearest(name, [*ESTIMATORS, *families()])
+        raise UsageError(
+            f"no estimator is called '{name}'", f"one of {', '.join(ESTIMATORS)}, or {' or '.join(families())}",
+            f"did you mean {near}?" if near else "see `codriver estimate --help`",
+        )  # fmt: skip
+    return ESTIMATORS[name]
+
+
+def needed_signals(name: str, vehicle: Vehicle | None) -> tuple[str, ...]:
+    """The signals an estimator needs with this vehicle: those the observer built for it requires.
+
+    A car of one gear, for example, may not need the gear. Without a vehicle that has all it takes, what the registry says.
+    """
+    estimator = get_estimator(name)
+    if vehicle is None or any(p not in vehicle for p in estimator.parameters):
+        return estimator.signals
+    return build(name, vehicle).required
+
+
+def build(
+    name: str,
+    vehicle: Vehicle | None = None,
+    *,
+    dt: float = 0.01,
+    ell: float | None = None,
+    preset: str | Preset | None = None,
+    form: str = "kalman",
+) -> Observer:
+    """Build an estimator.
+
+    Args:
+        name: one of ESTIMATORS.
+        vehicle: not needed by `kinematic`.
+        dt: tick, s.
+        ell: the knob; None takes the preset's (2 for 2017, 1.4 for 2015).
+        preset: noise of a paper, or one's own; None takes the estimator's, which is "bisoffi2017" for all of the family
+            intent. (`intent-torque` is of the 2015 paper, whose own noise is "bisoffi2015".)
+        form: "kalman" (missing and multi-rate rows exact) or "constant" (the papers' gain; small).
+
+    Raises:
+        UsageError: no such estimator, preset or form; the estimator has no knob or no noise; dt or ell out of range.
+        VehicleError: the vehicle is missing, or lacks a parameter.
+        DesignError: the design fails its certificate.
+    """
+    estimator = get_estimator(name)
+    check_tick(dt)
+    if form not in ("kalman", "constant"):
+        raise UsageError(f"form '{form}'", "'kalman' or 'constant'", "choose one")
+    if estimator.parameters and vehicle is None:
+        raise VehicleError(
+            f"{name} was given no vehicle", f"one with {', '.join(estimator.parameters)}",
+            "give a built-in name or a vehicle file (--vehicle), or use the estimator 'kinematic', which needs none",
+        )  # fmt: skip
+    if ell is not None and not estimator.knob:
+        raise UsageError(f"{name} has no knob, but ell = {ell:g} was given", "no ell", "leave ell (--ell) out")
+    if preset is not None and estimator.preset is None:
+        raise UsageError(f"{name} has no noise to choose, but a preset was given", "none", "leave it (--preset) out")
+    preset = estimator.preset if preset is None else preset
+    observer = estimator.build(vehicle, Design(dt, ell, preset, form))
+    settings = {"estimator": name, **observer.settings}
+    if preset is not None:
+        settings["preset"] = preset if isinstance(preset, str) else "own"
+    return replace(observer, name=name, settings=settings)
