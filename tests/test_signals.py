@@ -90,3 +90,11 @@ def test_log_never_changes():
 def test_wrong_unit_shows_in_the_range():
     log = cd.Log.of([cd.Signal("longitudinal_speed", np.arange(100.0), np.full(100, 130.0), "m/s")])
     assert "is its unit right" in log.implausible()[0]
+
+
+@pytest.mark.parametrize("time", [[0.0, 2.0, 1.0], [0.0, np.nan, 1.0], [0.0, 1.0, np.nan]])
+def test_stamps_that_do_not_run_forward_are_refused(time):
+    """Sampling searches the stamps, and would find the wrong values in silence."""
+    with pytest.raises(ValueError, match=r"x: stamp \d is .* must be numbers that do not decrease"):
+        cd.Signal("x", np.array(time), np.zeros(3), "")
+    assert len(cd.Signal("x", np.zeros(3), np.zeros(3), "")) == 3

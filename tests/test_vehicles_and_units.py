@@ -45,6 +45,8 @@ def test_every_value_has_a_source(name):
         ("[mass]\nvalue=nan\nunit='kg'\nsource='s'", "one number"),
         ("[mass]\nvalue=true\nunit='kg'\nsource='s'", "one number"),
         ("[mass]\nvalue=1550\nunit='kg'\nsd=-1\nsource='s'", "sd must be"),
+        ("[mass]\nvalue=1550\nunit='kg'\nsd=[1,2]\nsource='s'", "has 1 value and 2 sds"),
+        ("[transmission]\nvalue=[41,22,14]\nunit='1/m'\nsd=[1,2]\nsource='s'", "has 3 values and 2 sds"),
         ("[mass]\nvalue=1550\nunit='kg'\nsource='s'\ncolour='red'", "unknown key 'colour'"),
         ("mass = 3", "not a parameter"),
         ("[transmission]\nvalue=[41, 'x']\nunit='1/m'\nsource='s'", "one number per gear"),

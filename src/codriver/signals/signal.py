@@ -17,7 +17,7 @@ class Signal:
 
     Attributes:
         name: standard name, or the source's own name where there is no standard one.
-        time: stamps, s, shape (n,), non-decreasing.
+        time: stamps, s, shape (n,), not decreasing; others are refused, since sampling searches them.
         values: shape (n,), in `unit`; NaN where the source had no number.
         unit: SI unit for standard names.
         source: where it came from ("EngineData.Torque"), for people.
@@ -38,6 +38,13 @@ class Signal:
         if self.time.shape != self.values.shape or self.time.ndim != 1:
             raise ValueError(
                 f"{self.name}: time {self.time.shape} and values {self.values.shape} must be equal vectors"
+            )
+        step = self.time[1:] >= self.time[:-1]  # False for stamps that are not numbers, too
+        if not step.all():
+            at = int(np.argmin(step))
+            raise ValueError(
+                f"{self.name}: stamp {at + 1} is {self.time[at + 1]:.10g} s, after {self.time[at]:.10g} s; stamps must be numbers "
+                "that do not decrease: sort them, or read the recording with codriver.read, which mends its clocks"
             )
 
     def __len__(self) -> int:

@@ -149,6 +149,12 @@ def _parameter(name: str, table: Any, faults: list[str]) -> Parameter | None:
     if "sd" in table and (sd is None or min(sd if isinstance(sd, tuple) else (sd,)) < 0):
         faults.append(f"[{name}] sd must be a number that is not negative (or one per gear)")
         return None
+    if isinstance(sd, tuple) and (not isinstance(value, tuple) or len(sd) != len(value)):
+        count = len(value) if isinstance(value, tuple) else 1
+        faults.append(
+            f"[{name}] has {count} value{'s' if count > 1 else ''} and {len(sd)} sds; give one sd, or one for each value"
+        )
+        return None
     return Parameter(name, value, known.unit, sd, str(table["source"]))
 
 
