@@ -153,3 +153,22 @@ def test_c_reads_the_old_state_before_it_writes_the_new(tmp_path):
     )
     subprocess.run([compiler, "-std=c99", str(source), "-o", str(tmp_path / "swap")], check=True)
     assert subprocess.run([tmp_path / "swap"], capture_output=True, text=True, check=True).stdout == "2 11 1"
+
+
+def test_long_steps_compile_quickly():
+    """A step of 20,000 operations is compiled without optimising, and has the interpreter's bits."""
+
+    def long(carry, given_):
+        x = given_["x"]
+        for k in range(10_000):
+            x = x * (1.0 + 1e-6 * k) + 0.5
+        return {}, {"y": x}
+
+    recorded = record("long", long, [], ["x"])
+    assert recorded.operations() > 12_000
+    compiled = compile_loop(recorded)
+    columns, outputs = [np.array([0.3])], [np.empty(1)]
+    given_ = (ctypes.c_void_p * 1)(columns[0].ctypes.data)
+    made = (ctypes.c_void_p * 1)(outputs[0].ctypes.data)
+    compiled.run(1, 0, ctypes.addressof(given_), ctypes.addressof(made))
+    assert bits(outputs[0].tolist()) == bits(interpret(recorded, {}, {"x": 0.3})[1])
