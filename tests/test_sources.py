@@ -108,6 +108,25 @@ class TestMean:
         assert any("Right.Speed): 1 of 200 values are 182.042 m/s" in fault for fault in log.faults)
 
 
+class TestCodes:
+    def test_a_code_is_left_out_live_and_recorded(self, both):
+        """Gear 15 is no gear."""
+        box = each(BOX, np.arange(0, 20, 0.1), b"\x03")
+        box[50] = (box[50][0], BOX, b"\x0f")
+        log, live = both(box, '[gear]\nsource = "Box.Gear"\n')
+        alike(log, live)
+        assert set(live["gear"][1]) == {3}
+        assert any("15, out of -1 to 12" in fault for fault in log.faults)
+
+    def test_a_code_of_one_source_counts_as_missing(self, both):
+        t = np.arange(0, 20, 0.1)
+        right = each(RIGHT, t + 0.01, speed(8))
+        right[50:60] = [(stamp, RIGHT, b"\xff\xff") for stamp, _, _ in right[50:60]]
+        log, live = both(each(LEFT, t, speed(10)) + right, MEAN)
+        alike(log, live)
+        assert set(np.round(log["longitudinal_speed"].values, 6)) == {9, 10}
+
+
 class TestClock:
     def test_two_drives_in_one_file_are_not_mixed(self, both_drives):
         """The second drive is the longer one; each was driven at a speed of its own."""

@@ -79,7 +79,9 @@ class BusDecoder:
     def decode(self, identifier: int, data: bytes, time: float) -> list[tuple[str, float]]:
         """Standard names and SI values that a frame brings; nothing for frames that are not mapped or too short.
 
-        Of several sources the mean is taken as in a recorded log, see `codriver.logs.mean`.
+        Values outside what the quantity can show are left out, as codes for "not valid". A recorded log is judged as a
+        whole instead, and keeps such values where they are many or of many kinds (`codriver.logs.mend.drop_codes`). Of
+        several sources the mean is taken as in a recorded log, see `codriver.logs.mean`.
 
         Args:
             identifier, data: of the frame.
@@ -95,7 +97,8 @@ class BusDecoder:
         brought = []
         for part in self._parts.get(message.name, []):
             value = part.gain * float(numbers.get(part.signal, nan)) + part.shift
-            if isfinite(value):
+            quantity = VOCABULARY[part.name]
+            if isfinite(value) and quantity.low <= value <= quantity.high:
                 self._latest[part.name][part.place] = (time, value)
                 if part.place == 0:  # the first source is the clock
                     brought.append(part.name)

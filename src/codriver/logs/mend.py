@@ -96,7 +96,8 @@ def drop_codes(signal: Signal) -> tuple[Signal, list[str]]:
 
     Buses send numbers such as 15 for an unknown gear or the largest one for a sensor that is not ready. Such values lie
     out of the quantity's range and are always the same ones. Different values out of range are a wrong unit or a crash
-    instead, and stay; `Log.implausible` tells them where they are many.
+    instead, and stay; `Log.implausible` tells them where they are many. That takes the whole log to judge; on a live bus
+    (`codriver.live.BusDecoder`) every value out of range is left out.
 
     Returns:
         the signal with NaN in their place, and a sentence if there were any.
