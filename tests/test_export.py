@@ -113,3 +113,14 @@ def _has_fma() -> bool:
 
     features = binding.get_host_cpu_features()
     return bool(features.get("fma")) and bool(features.get("avx2"))
+
+
+def test_a_step_without_state(tmp_path):
+    """Only outputs that need no memory: the state is not an empty struct, which C99 does not have."""
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    export_c(cd.compile(cd.build("kinematic"), ["direction"]), tmp_path / "c")
+    sources = [tmp_path / "c" / "kinematic.c", tmp_path / "c" / "kinematic_check.c"]
+    built = subprocess.run(["gcc", *STRICT, *sources, "-o", tmp_path / "check", "-lm"], capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr
+    assert subprocess.run([tmp_path / "check"]).returncode == 0

@@ -22,6 +22,7 @@ from codriver.program import Program
 # What a float step may be off a double one, relative to max(1, |value|); measured on the golden vectors of the four
 # estimators at 100 Hz and ell = 2: docs/bit-contract.md.
 FLOAT_TOLERANCE = 2e-3
+_NO_STATE = ("char", "unused", "C99 has no empty structs")
 
 _HELPERS = {
     "pick": ["/* Adding 0 turns -0 into 0, so that every implementation of the step agrees on the sign of a zero. */",
@@ -103,7 +104,7 @@ def _header(program: Program, real: str) -> str:
         f"/* {observer.name}: {settings}", f" * One step every {observer.dt:g} s. SI units, axes of ISO 8855.", " */",
         f"#ifndef {guard}", f"#define {guard}", "", "#include <stdbool.h>", "", f"typedef {real} {name_type(name)};", "",
         "/* Carried from step to step; nothing else is remembered. */",
-        *_struct("state", name, [(name_type(name), key, "") for key in recorded.carry]),
+        *_struct("state", name, [(name_type(name), key, "") for key in recorded.carry] or [_NO_STATE]),
         *_struct("input", name, inputs),
         *_struct("output", name, [(name_type(name), o.name, f"{o.unit}; {o.meaning}") for o in kept]),
         f"void {name}_start({name}_state *s);", "",
@@ -132,9 +133,11 @@ def _source(program: Program, real: str) -> str:
     for helper in sorted(body.helpers):
         lines += [*_HELPERS[helper], ""]
     lines += [f"void {name}_start({name}_state *s)", "{"]
-    lines += [f"    s->{key} = {number(observer.carry[key], real)};" for key in recorded.carry]
+    lines += [f"    s->{key} = {number(observer.carry[key], real)};" for key in recorded.carry] or [
+        "    s->unused = 0;"
+    ]
     lines += ["}", "", f"void {name}_step({name}_state *s, const {name}_input *in, {name}_output *out)", "{"]
-    lines += [f"    {line}" for line in body.lines]
+    lines += [f"    {line}" for line in (body.lines if recorded.carry else ("(void)s;", *body.lines))]
     return "\n".join([*lines, "}", ""])
 
 
