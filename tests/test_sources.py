@@ -18,11 +18,14 @@ BO_ 256 Left: 2 X
  SG_ Speed : 0|16@1+ (0.01,0) [0|655] "km/h" X
 BO_ 257 Right: 2 X
  SG_ Speed : 0|16@1+ (0.01,0) [0|655] "km/h" X
+BO_ 259 Odd: 1 X
+ SG_ Bare : 0|4@1+ (1,0) [0|15] "" X
+ SG_ Miles : 4|4@1+ (1,0) [0|15] "mph" X
 BO_ 258 Box: 1 X
  SG_ Gear : 0|4@1+ (1,0) [0|15] "" X
  SG_ Ready : 4|1@1+ (1,0) [0|1] "" X
 """
-LEFT, RIGHT, BOX = 256, 257, 258
+LEFT, RIGHT, BOX, ODD = 256, 257, 258, 259
 Frame = tuple[float, int, bytes]
 MEAN = '[longitudinal_speed]\nsource = ["Left.Speed", "Right.Speed"]\n'
 
@@ -125,6 +128,44 @@ class TestCodes:
         log, live = both(each(LEFT, t, speed(10)) + right, MEAN)
         alike(log, live)
         assert set(np.round(log["longitudinal_speed"].values, 6)) == {9, 10}
+
+
+class TestUnits:
+    @pytest.mark.parametrize(
+        ("table", "words"),
+        [
+            ('source = "Odd.Bare"', "(Odd.Bare): neither the source nor the names file gives its unit; taken as m/s"),
+            ('source = "Odd.Bare"\nunit = "m/s"', ""),
+            ('source = "Odd.Miles"', ""),
+            ('source = ["Odd.Miles", "Left.Speed"]', ""),
+            (
+                'source = ["Odd.Miles", "Left.Speed"]\nunit = "km/h"',
+                "units km/h, mph, and the names file takes all in km/h",
+            ),
+            ('source = ["Odd.Miles", "Left.Speed"]\noffset = 1', "offset = 1 is taken in each of them"),
+        ],
+    )
+    def test_what_is_guessed_is_told(self, both, tmp_path, table, words):
+        names = f"[longitudinal_speed]\n{table}\n"
+        t = np.arange(0, 20, 0.1)
+        log, _ = both(each(ODD, t, b"\x55") + each(LEFT, t, speed(2)), names)
+        told = BusDecoder(tmp_path / "car.dbc", parse_names(names, "n")).faults
+        assert list(log.faults) == told
+        assert words in " ".join(told)
+        assert bool(words) == bool(told)
+
+    def test_numbers_without_a_unit_are_not_guessed(self, both):
+        log, _ = both(each(BOX, np.arange(0, 20, 0.1), b"\x03"), '[gear]\nsource = "Box.Gear"\n')
+        assert not log.faults
+
+    def test_sources_of_different_units(self, both):
+        t = np.arange(0, 20, 0.1)
+        log, live = both(
+            each(ODD, t, b"\x55") + each(LEFT, t - 0.01 + 0.02, speed(2)),
+            '[longitudinal_speed]\nsource = ["Odd.Miles", "Left.Speed"]\n',
+        )
+        alike(log, live)
+        assert log["longitudinal_speed"].values[-1] == pytest.approx((5 * 0.44704 + 2) / 2)
 
 
 class TestClock:

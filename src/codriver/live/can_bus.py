@@ -37,6 +37,9 @@ class BusDecoder:
         dbc: CAN database.
         names: names file, or loaded already; channels are "Message.Signal".
 
+    Attributes:
+        faults: what is doubtful in the mapping, one sentence each.
+
     Raises:
         LogError: the database cannot be read.
         NamesError: the names file names a signal that the database lacks.
@@ -65,6 +68,11 @@ class BusDecoder:
                 "channels of the database, as 'Message.Signal'",
                 "correct the names file; `codriver info LOG --dbc DBC` lists the channels of a log",
             )
+        self.faults = [
+            fault
+            for e in mapping.entries.values()
+            for fault in e.doubts({source: units[source] for source in e.source})
+        ]
         self._messages = {m.frame_id: m for m in database.messages}
         # By message: what its signals feed.
         self._parts: dict[str, list[_Part]] = {}

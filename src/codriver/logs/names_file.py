@@ -2,7 +2,7 @@
 
 [longitudinal_speed]
 source = "Wheels.FrontLeft"       # or a list, whose mean is taken: ["Wheels.RearLeft", "Wheels.RearRight"]
-unit = "km/h"                     # overrides what the source says; needed where it says nothing
+unit = "km/h"                     # overrides what the source says; where neither says, the SI unit is taken, and that is told
 scale = 1.01                      # optional: value * scale + offset, in the source's unit, before the unit is converted
 offset = 0.0
 sign = -1                         # optional: -1 turns the direction
@@ -43,11 +43,42 @@ class Entry:
     offset: float = 0.0
     sign: int = 1
 
+    def doubts(self, units: Mapping[str, str]) -> list[str]:
+        """A sentence for each unit that has to be guessed, or that contradicts another.
+
+        An error would refuse every database without units, of which there are many.
+
+        Args:
+            units: what the source says of each of its channels.
+        """
+        target = VOCABULARY[self.name].unit
+        sentences = []
+        if self.unit is None and target != "1":
+            sentences = [
+                f"{self.name} ({source}): neither the source nor the names file gives its unit; taken as {target}: "
+                "say so in the names file"
+                for source, unit in units.items()
+                if not unit
+            ]
+        told = sorted({unit for unit in units.values() if unit})
+        if len(told) > 1 and self.unit is not None:
+            sentences.append(
+                f"{self.name}: its sources have the units {', '.join(told)}, and the names file takes all in {self.unit}; "
+                "leave out unit there, and each is converted from its own"
+            )
+        if len(told) > 1 and self.unit is None and self.offset:
+            sentences.append(
+                f"{self.name}: its sources have the units {', '.join(told)}, and offset = {self.offset:g} is taken in each of "
+                "them; give sources of one unit"
+            )
+        return sentences
+
     def conversion(self, unit: str) -> tuple[float, float]:
         """Gain and shift that take a value of the source to the standard unit: standard = gain * value + shift.
 
         Args:
-            unit: what the source says; used where the entry gives none.
+            unit: what the source says; used where the entry gives none. Where neither says, the standard unit is taken;
+                `doubts` tells that.
 
         Raises:
             UnitError: the unit is unknown, or of another kind.

@@ -90,6 +90,8 @@ def read_recording(recording: Recording, names: str | Path | NamesFile | None = 
             )
         if entry.source[0] not in absent:  # the first of several gives the clock; a mean can do without the others
             there = {source: raw[source] for source in entry.source if source in raw}
+            if names is not None:  # known layouts and columns with standard names may rely on SI units
+                faults.extend(entry.doubts({source: part.unit for source, part in there.items()}))
             signals.append(_standard(entry, there, faults))
     signals = [signal for signal in signals if len(signal)]
     if not signals:
