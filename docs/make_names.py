@@ -43,7 +43,7 @@ def vocabulary() -> list[list[str]]:
 def parameters() -> list[list[str]]:
     """vehicles.md: what a vehicle file may hold."""
     from codriver.observers import ESTIMATORS
-    from codriver.vehicles.load import KNOWN
+    from codriver.vehicles import KNOWN
 
     rows = [["parameter", "SI unit", "bounds, SI", "one per gear", "needed by", "meaning"]]
     for name, known in KNOWN.items():

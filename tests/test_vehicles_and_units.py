@@ -9,7 +9,7 @@ from codriver.errors import NamesError, UnitError, VehicleError
 from codriver.logs.names_file import parse_names
 from codriver.names import VOCABULARY
 from codriver.units import _FAST, to_si
-from codriver.vehicles import built_in_vehicles
+from codriver.vehicles import Parameter, Vehicle, built_in_vehicles, save_vehicle
 from codriver.vehicles.load import parse_vehicle
 
 HEAD = 'name = "x"\ntitle = "X"\nsource = "test"\n'
@@ -67,6 +67,70 @@ def test_all_faults_at_once():
 def test_unknown_vehicle():
     with pytest.raises(VehicleError, match="did you mean 'bisoffi2017'"):
         cd.load_vehicle("bisofi2017")
+
+
+class TestWithParameter:
+    def test_adds_one(self):
+        zoe = cd.load_vehicle("renault-zoe")
+        braked = zoe.with_parameter("brake_coefficient", 0.002, sd=0.0001, source="fitted")
+        assert braked.parameters["brake_coefficient"] == Parameter("brake_coefficient", 0.002, "N/Pa", 0.0001, "fitted")
+        assert "brake_coefficient" not in zoe
+
+    def test_the_old_sd_does_not_belong_to_the_new_value(self):
+        zoe = cd.load_vehicle("renault-zoe")
+        assert zoe.parameters["mass"].sd == 80
+        assert zoe.with_parameter("mass", 1600).parameters["mass"].sd is None
+
+    def test_one_per_gear(self):
+        car = cd.load_vehicle("bisoffi2017").with_parameter("transmission", [40, 20], sd=[2, 1])
+        assert car.numbers("transmission") == (40, 20)
+        assert car.parameters["transmission"].sd == (2, 1)
+
+    def test_unknown_name(self):
+        with pytest.raises(VehicleError, match="did you mean 'mass'"):
+            cd.load_vehicle("renault-zoe").with_parameter("mas", 1500)
+
+
+class TestSave:
+    @pytest.mark.parametrize("name", built_in_vehicles())
+    def test_round_trip(self, name, tmp_path):
+        car = cd.load_vehicle(name)
+        assert cd.load_vehicle(save_vehicle(car, tmp_path / "car.toml")) == car
+
+    def test_every_digit_and_letter(self, tmp_path):
+        odd = Vehicle('a "b"', "back\\slash \n\x7f", "é ☃ '", {}).with_parameter("drag", 1 / 3, 1e-5, "tab\t# text")
+        odd = odd.with_parameter("transmission", (0.1 + 0.2, 41), (1 / 7, 0), "[mass]")
+        assert cd.load_vehicle(save_vehicle(odd, tmp_path / "odd.toml")) == odd
+
+    def test_nothing_is_replaced_unasked(self, tmp_path):
+        car, path = cd.load_vehicle("renault-zoe"), tmp_path / "car.toml"
+        save_vehicle(car, path)
+        lighter = car.with_parameter("mass", 1400)
+        with pytest.raises(VehicleError, match="there already"):
+            save_vehicle(lighter, path)
+        assert cd.load_vehicle(path) == car
+        save_vehicle(lighter, path, overwrite=True)
+        assert cd.load_vehicle(path) == lighter
+
+    @pytest.mark.parametrize(
+        ("file", "change", "said"),
+        [
+            ("car.toml", ("mass", 1.0), "outside 50 to 60000"),
+            ("car.toml", ("mass", float("nan")), "value must be one number"),
+            ("car.toml", ("transmission", (41, 22, 14), (1, 2)), "has 3 values and 2 sds"),
+            ("car.yaml", ("mass", 1500), "ending in .toml"),
+            ("no/car.toml", ("mass", 1500), "cannot write"),
+        ],
+    )
+    def test_what_could_not_be_loaded_is_not_written(self, tmp_path, file, change, said):
+        with pytest.raises(VehicleError, match=said):
+            save_vehicle(cd.load_vehicle("renault-zoe").with_parameter(*change), tmp_path / file)
+        assert not list(tmp_path.rglob("*"))
+
+    def test_foreign_units_are_not_written(self, tmp_path):
+        tonnes = Vehicle("x", "X", "test", {"mass": Parameter("mass", 1.5, "t", None, "scales")})
+        with pytest.raises(VehicleError, match="another vehicle"):
+            save_vehicle(tonnes, tmp_path / "car.toml")
 
 
 @pytest.mark.parametrize(

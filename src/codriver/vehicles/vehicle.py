@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from codriver.errors import VehicleError
 from codriver.names import nearest
+from codriver.vehicles.known import KNOWN
 
 
 @dataclass(frozen=True)
@@ -14,7 +15,7 @@ class Parameter:
     """One parameter in SI units.
 
     Attributes:
-        name: from the table in `codriver.vehicles.load`.
+        name: from the table in `codriver.vehicles.known`.
         value: one number, or one per gear.
         unit: SI unit.
         sd: standard deviation in the same unit, one number or one per gear; None where nobody gave one.
@@ -71,10 +72,33 @@ class Vehicle:
     def __contains__(self, name: str) -> bool:
         return name in self.parameters
 
-    def with_parameter(self, name: str, value: float | tuple[float, ...], source: str = "changed in memory") -> Vehicle:
-        """A vehicle with one parameter's value replaced, in SI units."""
-        old = self._get(name)
-        new = Parameter(name, value, old.unit, None, source)
+    def with_parameter(
+        self,
+        name: str,
+        value: float | Sequence[float],
+        sd: float | Sequence[float] | None = None,
+        source: str = "changed in memory",
+    ) -> Vehicle:
+        """A vehicle that has this parameter with this value, instead of its own or in addition.
+
+        Args:
+            name: a parameter of `codriver.vehicles.known`.
+            value: in SI units, one number or one per gear; bounds are checked when a vehicle is saved or loaded, so that
+                odd values can be tried.
+            sd: its standard deviation, in the same unit; None if nobody knows. That of the old value is not kept.
+            source: where the number comes from.
+
+        Raises:
+            VehicleError: no vehicle has such a parameter.
+        """
+        if name not in KNOWN:
+            near = nearest(name, KNOWN)
+            raise VehicleError(
+                f"'{name}' is not a parameter",
+                f"one of {', '.join(KNOWN)}" + (f"; did you mean {near}?" if near else ""),
+                "see docs/vehicles.md for the list",
+            )
+        new = Parameter(name, _numbers(value), KNOWN[name].unit, None if sd is None else _numbers(sd), source)
         return Vehicle(self.name, self.title, self.source, {**self.parameters, name: new})
 
     def _get(self, name: str) -> Parameter:
@@ -87,3 +111,8 @@ class Vehicle:
                 f"it among: {', '.join(sorted(self.parameters))}" + (f"; did you mean {near}?" if near else ""),
                 f"add a table [{name}] with value, unit and source to the vehicle file, or use an estimator that does without it",
             ) from None
+
+
+def _numbers(given: float | Sequence[float]) -> float | tuple[float, ...]:
+    """One number, or several as a tuple, which cannot be changed."""
+    return float(given) if isinstance(given, (int, float)) else tuple(float(number) for number in given)

@@ -1,0 +1,77 @@
+"""Write a vehicle file, in SI units, such that loading it gives the same vehicle."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from pathlib import Path
+from uuid import uuid4
+
+from codriver.errors import VehicleError
+from codriver.vehicles.load import parse_vehicle
+from codriver.vehicles.vehicle import Parameter, Vehicle
+
+
+def save_vehicle(vehicle: Vehicle, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a vehicle file that `load_vehicle` reads; the file appears under its name only when it is complete.
+
+    Args:
+        vehicle: what to write.
+        path: a .toml file.
+        overwrite: replace a file that is there.
+
+    Raises:
+        VehicleError: the file is there already or cannot be written, or the vehicle would not be loaded again (a value
+            out of bounds, a standard deviation too few); nothing is written then.
+    """
+    path = Path(path)
+    if path.suffix != ".toml":
+        raise VehicleError(f"cannot write a vehicle to '{path.name}'", "a name ending in .toml", "choose such a name")
+    if path.exists() and not overwrite:
+        raise VehicleError(
+            f"{path} is there already", "the name of a new file", "choose another name, or say overwrite=True"
+        )
+    text = _text(vehicle)
+    if parse_vehicle(text, f"the file of '{vehicle.name}'") != vehicle:
+        raise VehicleError(
+            f"the file of '{vehicle.name}' would be read as another vehicle",
+            "parameters in the units of codriver.vehicles.KNOWN",
+            "make parameters with Vehicle.with_parameter",
+        )
+    draft = path.with_name(f".{path.stem}-{uuid4().hex[:8]}.toml")
+    try:
+        draft.write_text(text, encoding="utf-8", newline="\n")
+        draft.replace(path)
+    except OSError as error:
+        raise VehicleError(
+            f"cannot write {path}: {error.strerror or error}", "a folder you may write into", "choose another folder"
+        ) from None
+    finally:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
+    return path
+
+
+def _text(vehicle: Vehicle) -> str:
+    """The text of a vehicle's file."""
+    head = f"name = {_quoted(vehicle.name)}\ntitle = {_quoted(vehicle.title)}\nsource = {_quoted(vehicle.source)}\n"
+    return head + "".join(_table(parameter) for parameter in vehicle.parameters.values())
+
+
+def _table(parameter: Parameter) -> str:
+    """One parameter's table."""
+    lines = [f"[{parameter.name}]", f"value = {_number(parameter.value)}", f"unit = {_quoted(parameter.unit)}"]
+    if parameter.sd is not None:
+        lines.append(f"sd = {_number(parameter.sd)}")
+    lines.append(f"source = {_quoted(parameter.source)}")
+    return "\n" + "\n".join(lines) + "\n"
+
+
+def _number(value: float | tuple[float, ...]) -> str:
+    """A number or list of numbers with all their digits."""
+    return f"[{', '.join(map(_number, value))}]" if isinstance(value, tuple) else repr(float(value))
+
+
+def _quoted(text: str) -> str:
+    """A string as TOML writes it: as JSON does, but DEL too must be escaped."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
