@@ -22,7 +22,7 @@ def demo(
     import shlex
     import sys
 
-    from codriver.cli.estimate import estimate_log
+    from codriver.cli.estimate import estimate_file
     from codriver.cli.terminal import console, working
     from codriver.errors import UsageError
     from codriver.logs import read
@@ -43,7 +43,7 @@ def demo(
     screen.print(f"$ codriver {shlex.join(command)}\n", markup=False)
     sys.argv = ["codriver", *command]  # provenance names the command that makes this result
     truth = read(files.truth)
-    estimate = estimate_log(
+    estimate = estimate_file(
         "intent", files.log, result, "bisoffi2017", files.dbc, files.names, report=report, truth=truth
     )
     _compare(estimate, truth, screen)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,7 +13,6 @@ from codriver.cli.options import Bus, Dbc, Ell, EstimatorName, Form, Json, LogPa
 if TYPE_CHECKING:
     from codriver.estimate import Estimate
     from codriver.signals import Log
-    from codriver.vehicles import Vehicle
 
 
 def estimate(
@@ -39,10 +38,10 @@ def estimate(
 
     Example: codriver estimate intent drive.blf --dbc car.dbc --names names.toml --vehicle bisoffi2017 -o drive.parquet
     """
-    estimate_log(estimator, log, out, vehicle, dbc, names, ell, rate, preset, form, bus, report, json)
+    estimate_file(estimator, log, out, vehicle, dbc, names, ell, rate, preset, form, bus, report, json)
 
 
-def estimate_log(
+def estimate_file(
     estimator: str,
     path: Path,
     out: Path,
@@ -61,29 +60,28 @@ def estimate_log(
     """What the command does; the demo calls it too, with the truth for its report."""
     from codriver.cli.options import check_inputs
     from codriver.cli.terminal import command_line, say, working
-    from codriver.errors import UsageError
     from codriver.logs import read
+    from codriver.run import check_rate, choose, estimate_log
     from codriver.vehicles import load_vehicle
 
     check_inputs(path, dbc, names)
     _check_outputs(out, report, path)
-    if rate is not None and not 1 <= rate <= 10000:
-        raise UsageError(f"--rate {rate:g}", "1 to 10000 Hz", "choose a rate near the accelerometer's, such as 100")
+    check_rate(rate)
     vehicle = load_vehicle(vehicle_name) if vehicle_name is not None else None
     with working(not as_json, 3) as stage:
         stage(f"reading {path.name}")
         recorded = read(path, dbc=dbc, names=names, bus=bus)
-        name, why = _choose(estimator, recorded, vehicle)
+        name, why = choose(estimator, recorded, vehicle)
         stage(f"estimating: {name}")
-        result = run_estimator(name, recorded, vehicle, ell=ell, rate=rate, preset=preset, form=form)
+        result = estimate_log(name, recorded, vehicle, ell=ell, rate=rate, preset=preset, form=form)
         _refuse_empty(result)
         stage(f"writing {out.name}" + (f" and {report.name}" if report is not None else ""))
         _write(result, out, report, command_line(), truth)
-    summary = summarise(result, str(out), str(report) if report is not None else None, why)
+    told = _told(result, out, report, why)
     if as_json:
-        typer.echo(json_module.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False))
+        typer.echo(json_module.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
     else:
-        say(summary)
+        say(told)
     return result
 
 
@@ -130,44 +128,6 @@ def _refuse_empty(result: Estimate) -> None:
     )
 
 
-def _choose(estimator: str, log: Log, vehicle: Vehicle | None) -> tuple[str, str]:
-    """The estimator's name, and why it was taken where the log decided."""
-    from codriver.observers.feed import best, feeds
-    from codriver.observers.registry import families, get_estimator
-
-    if estimator not in families():
-        return get_estimator(estimator).name, ""
-    unusable = [fault for fault in log.faults if fault.endswith("it is left out")]
-    feed = best(log, vehicle, log.source + (f" ({'; '.join(unusable)})" if unusable else ""), estimator)
-    better = []
-    for other in feeds(log, vehicle, estimator):
-        if other.estimator == feed.estimator:
-            break
-        better.append(f"{other.estimator} lacks {other.lacks(vehicle)}")
-    return feed.estimator, "the best this log can feed" + (f" ({'; '.join(better)})" if better else "")
-
-
-def run_estimator(
-    name: str,
-    log: Log,
-    vehicle: Vehicle | None,
-    *,
-    ell: float | None,
-    rate: float | None,
-    preset: str | None,
-    form: str,
-) -> Estimate:
-    """Build, compile and run an estimator at the rate given or the log's."""
-    from codriver.observers import build
-    from codriver.observers.feed import suggest_rate
-    from codriver.program import compile
-
-    probe = build(name, vehicle, dt=0.01, ell=ell, preset=preset, form=form)
-    rate = rate if rate is not None else suggest_rate(log, probe.measured or probe.required)
-    observer = build(name, vehicle, dt=1.0 / rate, ell=ell, preset=preset, form=form)
-    return compile(observer).run(log)
-
-
 def _write(result: Estimate, out: Path, report: Path | None, command: str, truth: Log | None) -> None:
     """Write result and report: both or neither."""
     from codriver.estimate_file import save_estimate
@@ -189,42 +149,19 @@ def _write(result: Estimate, out: Path, report: Path | None, command: str, truth
         draft.unlink(missing_ok=True)
 
 
-def summarise(result: Estimate, out: str, report: str | None, why: str) -> dict[str, object]:
+def _told(result: Estimate, out: Path, report: Path | None, why: str) -> dict[str, object]:
     """What the terminal shows and --json prints."""
-    import numpy as np
-
-    def number(value: float | np.floating[Any]) -> float | None:
-        return float(value) if np.isfinite(value) else None  # JSON knows no NaN
+    from codriver.summary import summarise
 
     check = result.check()
-    valid = result.valid
-    rows: dict[str, dict[str, float | str | None]] = {}
-    for output in result.estimates:
-        values = result.columns[output.name][valid]
-        sd = result.sd(output.name)
-        rows[output.name] = {
-            "unit": output.unit,
-            "rms": number(np.sqrt(np.mean(values**2))) if values.size else None,
-            "p5": number(np.quantile(values, 0.05)) if values.size else None,
-            "p95": number(np.quantile(values, 0.95)) if values.size else None,
-            "mean_sd": number(np.mean(sd[valid])) if sd is not None and values.size else None,
-        }
-    shifts = np.flatnonzero(np.diff(result.flag("gear_shift").astype(int)) == 1).size
-    speed = result.grid.values.get("longitudinal_speed")
     return {
         "estimator": result.observer,
         "why": why,
         "settings": dict(result.provenance),
         "log": result.log.source,
-        "duration_s": round(len(result.grid) * result.grid.dt, 3),
-        "distance_m": round(float(np.nansum(np.abs(speed)) * result.grid.dt), 1) if speed is not None else None,
-        "rate_hz": round(1 / result.grid.dt, 6),
-        "valid_share": round(check.valid_share, 4),
-        "gear_shifts": int(shifts),
-        "braking_share": round(float(result.flag("braking").mean()), 4) if len(result.grid) else 0.0,
-        "estimates": rows,
+        **summarise(result).to_dict(),
         "verdict": check.verdict,
         "findings": [{"severity": f.severity, "text": f.text} for f in check.findings],
-        "result": out,
-        "report": report,
+        "result": str(out),
+        "report": str(report) if report is not None else None,
     }

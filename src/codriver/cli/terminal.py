@@ -56,11 +56,8 @@ def say(summary: dict[str, Any]) -> None:
     if summary["why"]:
         out.print(f"chosen as {escape(summary['why'])}")
     distance = f", {summary['distance_m'] / 1000:.2f} km" if summary["distance_m"] is not None else ""
-    extra = (
-        f", {summary['gear_shifts']} gear shifts, braking {summary['braking_share']:.0%}"
-        if summary["gear_shifts"]
-        else ""
-    )
+    extra = f", {summary['gear_shifts']} gear shifts" if summary.get("gear_shifts") else ""
+    extra += f", braking {summary['braking_share']:.0%}" if summary.get("braking_share") else ""
     out.print(
         f"{summary['duration_s']:.1f} s{distance} at {summary['rate_hz']:g} Hz, valid {summary['valid_share']:.0%}{extra}\n"
     )

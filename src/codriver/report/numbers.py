@@ -12,9 +12,12 @@ from codriver.report.panels import SIGMAS, on_ticks
 from codriver.report.shown import clock, number, shown, shown_unit, words
 from codriver.signals import Log
 from codriver.signals.signal import Array
+from codriver.summary import Summary
 
 ACCELERATIONS = ("intentional_acceleration", "longitudinal_acceleration")
 JERKS = ("intentional_jerk", "longitudinal_jerk")
+LESS = ("longitudinal_speed", "acceleration_offset")  # their figures say little of the driver
+SHARED = {"both_pedals": "both pedals pressed", "standstill": "standing still"}
 LONGEST_LAG = 2.0  # s
 
 
@@ -27,46 +30,47 @@ class Row:
     note: str = ""
 
 
-def summary(estimate: Estimate) -> list[Row]:
-    """What the estimate says of the drive, over the valid ticks."""
-    valid, n = estimate.valid, len(estimate.grid)
+def figures(estimate: Estimate, told: Summary) -> list[Row]:
+    """The summary as people read it."""
     rows = [
-        Row("duration", clock(n * estimate.grid.dt)),
-        Row("distance", _distance(estimate)),
+        Row("duration", clock(told.duration)),
+        Row("distance", _distance(told.distance)),
         Row(
             "valid",
-            f"{valid.mean():.1%}" if n else "–",
-            "share of the duration; jerk and acceleration below are of this part",
+            f"{told.valid_share:.1%}" if told.duration else "–",
+            "share of the duration; estimates are of this part",
         ),
     ]
-    for name in (*JERKS, *ACCELERATIONS):
-        if name not in estimate:
-            continue
-        values, unit = shown(name, estimate.columns[name])[valid], shown_unit(name)
-        if not values.size:
+    first = [name for name in (*JERKS, *ACCELERATIONS) if name in told.estimates]
+    for name in (*first, *(other for other in told.estimates if other not in (*first, *LESS))):
+        found, unit = told.estimates[name], shown_unit(name, told.estimates[name].unit)
+        if found.rms is None or found.p5 is None or found.p95 is None:
             rows.append(Row(words(name), "–", "nothing valid"))
             continue
-        low, high = np.percentile(values, [5, 95])
-        rms = float(np.sqrt(np.mean(values**2)))
-        rows.append(Row(f"{words(name)}, RMS", f"{number(rms)} {unit}"))
+        low, high = shown(name, [found.p5, found.p95])
+        rows.append(Row(f"{words(name)}, RMS", f"{number(_size(name, found.rms))} {unit}"))
         rows.append(Row(f"{words(name)}, 5% to 95%", f"{number(low)} to {number(high)} {unit}", "quantiles"))
-        sd = estimate.sd(name)
-        if sd is not None:
-            rows.append(Row(f"{words(name)}, mean standard deviation", f"{number(float(sd[valid].mean()))} {unit}"))
+        if found.mean_sd is not None:
+            rows.append(Row(f"{words(name)}, mean standard deviation", f"{number(_size(name, found.mean_sd))} {unit}"))
     lag = expected_lag(estimate)
     if lag is not None:
         rows.append(Row("expected delay of the jerk", f"{number(lag)} s", "slow changes show up about this much late"))
-    if "gear_shift" in estimate:
-        shifting = estimate.flag("gear_shift")
-        rows.append(Row("gear shifts", str(int(np.sum(np.diff(shifting.astype(int), prepend=0) > 0)))))
-    for flag, what in (
-        ("braking", "braking"),
-        ("both_pedals", "both pedals pressed"),
-        ("standstill", "standing still"),
-    ):
-        if flag in estimate and n:
-            rows.append(Row(what, f"{estimate.flag(flag).mean():.1%}", "share of the duration"))
+    if told.gear_shifts is not None:
+        rows.append(Row("gear shifts", str(told.gear_shifts)))
+    for flag, share in told.shares.items():
+        rows.append(Row(SHARED.get(flag, words(flag)), f"{share:.1%}", "share of the duration"))
     return rows
+
+
+def _size(name: str, value: float) -> float:
+    """A size (rms, standard deviation) in the display unit: its factor without its offset."""
+    return float(np.abs(shown(name, value) - shown(name, 0.0)))
+
+
+def _distance(metres: float | None) -> str:
+    if metres is None:
+        return "unknown: there is no speed"
+    return f"{metres / 1000:.2f} km" if metres >= 1000 else f"{metres:.0f} m"
 
 
 def expected_lag(estimate: Estimate) -> float | None:
@@ -156,19 +160,3 @@ def _best_lag(value: Array, right: Array, used: np.ndarray, dt: float) -> tuple[
         if rms < best[1]:
             best = (ticks * dt, rms)
     return best
-
-
-def _distance(estimate: Estimate) -> str:
-    """Distance from the estimated speed, or else the measured one."""
-    name = "longitudinal_speed"
-    speed: Array
-    if name in estimate:
-        speed = estimate.columns[name]
-    elif name in estimate.log and len(estimate.log[name]) and len(estimate.grid):
-        time = estimate.time
-        grid = estimate.log.sample([name], estimate.grid.dt, start=float(time[0]), stop=float(time[-1]))
-        speed = np.where(grid.held[name], grid.values[name], 0.0)
-    else:
-        return "unknown: there is no speed"
-    metres = float(np.abs(speed[np.isfinite(speed)]).sum() * estimate.grid.dt)
-    return f"{metres / 1000:.2f} km" if metres >= 1000 else f"{metres:.0f} m"

@@ -14,13 +14,14 @@ from pathlib import PurePath
 from codriver.estimate import Estimate
 from codriver.report import tables
 from codriver.report.figure import Figure, figure
-from codriver.report.numbers import Row, errors, summary
+from codriver.report.numbers import Row, errors, figures
 from codriver.report.pack import packed
 from codriver.report.panels import panels
 from codriver.report.shown import number
 from codriver.report.tables import text
 from codriver.report.words import how_to_read, what
 from codriver.signals import Log
+from codriver.summary import summarise
 
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 _FAR = 1e5  # s; times beyond (dates as seconds) are shown from the start of the drive
@@ -38,7 +39,7 @@ def page(estimate: Estimate, title: str | None, truth: Log | None, command: str 
     check = estimate.check()
     name = PurePath(estimate.log.source.replace("\\", "/")).name
     title = title or f"{_TITLES.get(estimate.observer, 'Driver intention')}: {name or 'recording in memory'}"
-    rows = summary(estimate)
+    rows = figures(estimate, summarise(estimate))
     reading = "".join(f"<p>{text(p)}</p>" for p in how_to_read(estimate))
     parts = [
         f"<h1>{text(title)}</h1><p class=lead>{text(what(estimate))}</p>",
