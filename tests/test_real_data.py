@@ -249,12 +249,13 @@ class TestCanEdge:
         assert all(abs(found[axis]) < 0.4 for axis in "XZ"), found
 
     def test_values_of_a_sensor_that_was_not_ready(self, folder):
-        """The second log holds +-64 m/s^2 on all axes at once: missing, and told."""
+        """The second log holds +-64 m/s^2 on all axes at once, where ImuValid is 0: left out, and told."""
         log = cd.read(
             folder / "00000002-60FEB8E3.MF4", dbc=folder / "dbc" / "canmod-gps.dbc", names=NAMES / "canedge.toml"
         )
         assert np.nanmax(np.abs(log["longitudinal_acceleration"].values)) < 6
-        assert any("64 m/s^2" in fault and "taken as missing" in fault for fault in log.faults)
+        assert any("values left out, where gnss_imu.ImuValid is 0" in fault for fault in log.faults)
+        assert not any("64 m/s^2" in fault for fault in log.faults)
 
 
 class TestIracing:

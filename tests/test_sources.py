@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import codriver as cd
+from codriver.errors import NamesError
 from codriver.live import BusDecoder
 from codriver.logs.mend import mend_clock
 from codriver.logs.names_file import parse_names
@@ -166,6 +167,59 @@ class TestUnits:
         )
         alike(log, live)
         assert log["longitudinal_speed"].values[-1] == pytest.approx((5 * 0.44704 + 2) / 2)
+
+
+class TestValid:
+    NAMES = MEAN + 'valid = "Box.Ready"\n'
+    READY, NOT = b"\x10", b"\x00"
+
+    def test_values_count_only_while_the_flag_is_up(self, both):
+        t = np.arange(0, 20, 0.1)
+        flags = each(BOX, np.array([2.05, 8.05]), self.READY) + each(BOX, np.array([6.05]), self.NOT)
+        log, live = both(
+            each(LEFT, t, speed(10)) + flags, '[longitudinal_speed]\nsource = "Left.Speed"\nvalid = "Box.Ready"'
+        )
+        alike(log, live)
+        stamps = log["longitudinal_speed"].time
+        np.testing.assert_allclose(stamps, t[((t > 2.05) & (t < 6.05)) | (t > 8.05)])
+        assert (
+            "longitudinal_speed (Left.Speed): 41 of 200 values left out, where Box.Ready is 0 or not there yet"
+            in log.faults
+        )
+        assert "longitudinal_speed (Left.Speed): 1 gap, the longest 2.1 s at 6.00 s" in log.faults
+        assert "Box.Ready" not in log.unmapped
+
+    def test_in_the_frame_itself(self, both):
+        """The flag of a frame counts for the values of that frame."""
+        t = np.arange(0, 20, 0.1)
+        frames = [(round(x, 6), BOX, b"\x13" if k % 10 else b"\x0f") for k, x in enumerate(t.tolist())]
+        log, live = both(frames, '[gear]\nsource = "Box.Gear"\nvalid = "Box.Ready"\n')
+        alike(log, live)
+        assert set(log["gear"].values) == {3}
+        assert len(log["gear"]) == 180
+
+    def test_in_a_mean(self, both):
+        t = np.arange(0, 20, 0.1)
+        frames = each(LEFT, t, speed(10)) + each(RIGHT, t + 0.03, speed(8))
+        flags = each(BOX, t[:100] + 0.01, self.READY) + each(BOX, t[100:] + 0.04, self.NOT)
+        log, live = both(frames + flags, self.NAMES)
+        alike(log, live)
+        assert log["longitudinal_speed"].time[-1] == 10
+
+    def test_a_flag_that_is_never_there(self, both):
+        t = np.arange(0, 20, 0.1)
+        text = '[longitudinal_speed]\nsource = "Left.Speed"\n[gear]\nsource = "Odd.Bare"\nvalid = "Box.Ready"\n'
+        log, live = both(each(LEFT, t, speed(10)) + each(ODD, t, b"\x03"), text)
+        alike(log, live)
+        assert set(log) == {"longitudinal_speed"}
+        assert any("gear: the recording has no channel 'Box.Ready'" in fault for fault in log.faults)
+
+    def test_wrong_entries(self, tmp_path):
+        with pytest.raises(NamesError, match="valid must be the name of a channel"):
+            parse_names('[gear]\nsource = "Box.Gear"\nvalid = 1\n', "n")
+        (tmp_path / "car.dbc").write_text(DBC)
+        with pytest.raises(NamesError, match=r"Box\.No"):
+            BusDecoder(tmp_path / "car.dbc", parse_names('[gear]\nsource = "Box.Gear"\nvalid = "Box.No"\n', "n"))
 
 
 class TestClock:

@@ -21,13 +21,17 @@ from codriver.names import VOCABULARY
 
 @dataclass(frozen=True)
 class _Part:
-    """A signal of a message that feeds a standard signal, as source number `place`: standard = gain * value + shift."""
+    """A signal of a message that feeds a standard signal, as source number `place`: standard = gain * value + shift.
+
+    It counts while the channel `valid`, if any, is up.
+    """
 
     name: str
     place: int
     signal: str
     gain: float
     shift: float
+    valid: str | None
 
 
 class BusDecoder:
@@ -61,7 +65,7 @@ class BusDecoder:
                 f"cannot read {dbc}: {error}", "a CAN database (DBC)", "check the path and the file"
             ) from None
         units = {f"{m.name}.{s.name}": s.unit or "" for m in database.messages for s in m.signals}
-        absent = sorted({s for e in mapping.entries.values() for s in e.source if s not in units})
+        absent = sorted({s for e in mapping.entries.values() for s in e.channels if s not in units})
         if absent:
             raise NamesError(
                 f"{mapping.where or 'the names file'} maps {', '.join(absent[:4])}, which {dbc} does not have",
@@ -79,8 +83,13 @@ class BusDecoder:
         for entry in mapping.entries.values():
             for place, source in enumerate(entry.source):
                 message, signal = source.split(".", 1)
-                part = _Part(entry.name, place, signal, *entry.conversion(units[source]))
+                part = _Part(entry.name, place, signal, *entry.conversion(units[source]), entry.valid)
                 self._parts.setdefault(message, []).append(part)
+        # Whether each channel that says when others count is up; by message, those it carries.
+        self._up = {e.valid: False for e in mapping.entries.values() if e.valid is not None}
+        self._flags: dict[str, list[str]] = {}
+        for channel in self._up:
+            self._flags.setdefault(channel.split(".", 1)[0], []).append(channel)
         # Newest stamp and SI value of each source, by standard name; those of a source not met yet are too old for ever.
         self._latest = {e.name: [(-inf, nan)] * len(e.source) for e in mapping.entries.values()}
 
@@ -102,9 +111,15 @@ class BusDecoder:
             numbers = message.decode(data, decode_choices=False, allow_truncated=True)
         except Exception:
             return []  # a frame that does not fit its database is lost, not the session
+        for channel in self._flags.get(message.name, []):
+            flag = float(numbers.get(channel.split(".", 1)[1], nan))
+            if isfinite(flag):
+                self._up[channel] = flag != 0
         brought = []
         for part in self._parts.get(message.name, []):
             value = part.gain * float(numbers.get(part.signal, nan)) + part.shift
+            if part.valid is not None and not self._up[part.valid]:
+                continue
             quantity = VOCABULARY[part.name]
             if isfinite(value) and quantity.low <= value <= quantity.high:
                 self._latest[part.name][part.place] = (time, value)

@@ -6,6 +6,7 @@ unit = "km/h"                     # overrides what the source says; where neithe
 scale = 1.01                      # optional: value * scale + offset, in the source's unit, before the unit is converted
 offset = 0.0
 sign = -1                         # optional: -1 turns the direction
+valid = "Wheels.Ready"            # optional: values count only where this channel, held, is not 0
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from codriver.errors import NamesError, UnitError
 from codriver.names import VOCABULARY, nearest
 from codriver.units import to_si
 
-_FIELDS = ("source", "unit", "scale", "offset", "sign")
+_FIELDS = ("source", "unit", "scale", "offset", "sign", "valid")
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,7 @@ class Entry:
         unit: overrides the source's unit; None keeps it.
         scale, offset: applied in the source's unit, before conversion.
         sign: 1 or -1.
+        valid: a channel of the source; values count only where its newest value is not 0. None: all count.
     """
 
     name: str
@@ -42,6 +44,12 @@ class Entry:
     scale: float = 1.0
     offset: float = 0.0
     sign: int = 1
+    valid: str | None = None
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """All channels of the source that it needs."""
+        return self.source if self.valid is None else (*self.source, self.valid)
 
     def doubts(self, units: Mapping[str, str]) -> list[str]:
         """A sentence for each unit that has to be guessed, or that contradicts another.
@@ -133,7 +141,7 @@ def parse_names(text: str, where: str) -> NamesFile:
     if faults:
         raise NamesError(
             f"{where}: " + "; ".join(faults),
-            "tables named by standard signal names, each with source, and unit, scale, offset, sign where needed",
+            "tables named by standard signal names, each with source, and unit, scale, offset, sign, valid where needed",
             "mend the file; docs/names.md lists the names, `codriver info LOG` the channels of a log",
         )
     return NamesFile.of(*entries, where=where)
@@ -159,6 +167,9 @@ def _entry(name: str, table: Any, faults: list[str]) -> Entry | None:
         faults.append(f"[{name}] scale must not be 0")
     if table.get("sign", 1) not in (1, -1):
         faults.append(f"[{name}] sign must be 1 or -1")
+    valid = table.get("valid")
+    if valid is not None and not (isinstance(valid, str) and valid):
+        faults.append(f"[{name}] valid must be the name of a channel")
     unit = table.get("unit")
     if unit is not None:
         try:
@@ -168,5 +179,11 @@ def _entry(name: str, table: Any, faults: list[str]) -> Entry | None:
     if len(faults) > before:
         return None
     return Entry(
-        name, sources, unit, float(table.get("scale", 1.0)), float(table.get("offset", 0.0)), int(table.get("sign", 1))
+        name,
+        sources,
+        unit,
+        float(table.get("scale", 1.0)),
+        float(table.get("offset", 0.0)),
+        int(table.get("sign", 1)),
+        valid,
     )

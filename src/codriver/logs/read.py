@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from codriver.errors import LogError, NamesError, UnitError
 from codriver.logs.mean import mean_of
@@ -16,6 +17,7 @@ from codriver.logs.recording import RawSignal, Recording
 from codriver.logs.registry import ReadOptions, find_reader
 from codriver.names import VOCABULARY, nearest
 from codriver.signals import Log, Signal
+from codriver.signals.signal import Array
 
 
 def open_recording(path: str | Path, *, dbc: str | Path | None = None, bus: int | None = None) -> Recording:
@@ -77,22 +79,23 @@ def read_recording(recording: Recording, names: str | Path | NamesFile | None = 
             "write a names file (docs/names.md shows how) and give it with --names",
         )
     faults: list[str] = []
-    wanted = {source for entry in mapping.entries.values() for source in entry.source}
+    wanted = {channel for entry in mapping.entries.values() for channel in entry.channels}
     raw = recording.load(wanted)
     signals = []
     for entry in mapping.entries.values():
-        absent = [source for source in entry.source if source not in raw]
+        absent = [channel for channel in entry.channels if channel not in raw]
         if absent:
             near = nearest(absent[0], channels)
             faults.append(
                 f"{entry.name}: the recording has no channel '{absent[0]}'"
                 + (f"; did the names file mean {near}?" if near else "")
             )
-        if entry.source[0] not in absent:  # the first of several gives the clock; a mean can do without the others
+        # The first of several sources gives the clock; a mean can do without the others.
+        if entry.source[0] not in absent and entry.valid not in absent:
             there = {source: raw[source] for source in entry.source if source in raw}
             if names is not None:  # known layouts and columns with standard names may rely on SI units
                 faults.extend(entry.doubts({source: part.unit for source, part in there.items()}))
-            signals.append(_standard(entry, there, faults))
+            signals.append(_standard(entry, there, raw.get(entry.valid or ""), faults))
     signals = [signal for signal in signals if len(signal)]
     if not signals:
         raise (LogError if names is None else NamesError)(
@@ -102,10 +105,9 @@ def read_recording(recording: Recording, names: str | Path | NamesFile | None = 
         )
     signals, told = compare_clocks(signals)
     faults += told
-    used = {source for entry in mapping.entries.values() for source in entry.source}
     log = Log.of(signals, recording.path)
     all_faults = (*recording.faults, *faults, *log.implausible())
-    return Log(log.signals, recording.path, all_faults, tuple(sorted(set(channels) - used)))
+    return Log(log.signals, recording.path, all_faults, tuple(sorted(set(channels) - wanted)))
 
 
 def own_names(recording: Recording) -> NamesFile:
@@ -119,13 +121,21 @@ def own_names(recording: Recording) -> NamesFile:
     return NamesFile(entries, "the channels' own names")
 
 
-def _standard(entry: Entry, parts: Mapping[str, RawSignal], faults: list[str]) -> Signal:
-    """One standard signal from its raw parts, by their source."""
+def _standard(entry: Entry, parts: Mapping[str, RawSignal], flag: RawSignal | None, faults: list[str]) -> Signal:
+    """One standard signal from its raw parts, by their source, and the channel that says when they count."""
     target = VOCABULARY[entry.name].unit
     made = []
     for source, part in parts.items():
         time, values, notes = mend_clock(np.asarray(part.time, float), np.asarray(part.values, float))
         faults.extend(f"{named(entry.name, source)}: {note}" for note in notes)
+        if flag is not None:
+            counts = _up(flag, time)
+            if not counts.all():
+                left = (
+                    f"{int((~counts).sum())} of {time.size} values left out, where {entry.valid} is 0 or not there yet"
+                )
+                faults.append(f"{named(entry.name, source)}: {left}")
+                time, values = time[counts], values[counts]
         try:
             gain, shift = entry.conversion(part.unit)
         except UnitError as error:
@@ -142,3 +152,12 @@ def _standard(entry: Entry, parts: Mapping[str, RawSignal], faults: list[str]) -
     signal, codes = drop_codes(signal)
     faults.extend([*missing, *codes])
     return signal
+
+
+def _up(flag: RawSignal, time: Array) -> npt.NDArray[np.bool_]:
+    """Whether a flag's newest finite value at each time is not 0."""
+    stamps, values, _ = mend_clock(np.asarray(flag.time, float), np.asarray(flag.values, float))
+    finite = np.isfinite(values)
+    stamps, up = stamps[finite], values[finite] != 0
+    index = np.searchsorted(stamps, time, side="right") - 1
+    return (index >= 0) & up[np.maximum(index, 0)] if stamps.size else np.zeros(time.size, bool)
