@@ -13,12 +13,14 @@ import pytest
 import codriver
 from codriver.errors import UsageError
 from codriver.estimate import Estimate
+from codriver.observers import Output, Preset
 from codriver.report import write_report
 from codriver.report.numbers import errors, expected_lag
 from codriver.report.pack import MOST, Pack, thin_out
 from codriver.report.shown import number, shown
 from codriver.report.stretches import gaps, not_valid
 from codriver.signals import Grid, Log, Signal
+from toy_wheel import OUTPUTS, toy_wheel, wheel_log
 
 ESTIMATORS = ("intent-pedals", "intent-torque", "kinematic", "pedals-only")
 
@@ -186,6 +188,51 @@ class TestPanels:
         assert "1500000000.000 s of the recording" in html
 
 
+class TestForeignObserver:
+    """A report of an observer of which it knows no name: a wheel's torque from its angle."""
+
+    @pytest.fixture
+    def wheel(self) -> Estimate:
+        return codriver.compile(toy_wheel()).run(wheel_log())
+
+    def test_each_estimate_has_its_panel(self, wheel, tmp_path):
+        torque = wheel.log["driver_torque"]
+        truth = Log.of([Signal("driver_torque", torque.time, torque.values, "N*m")])
+        spec = figure_of(written(wheel, tmp_path, truth=truth))
+        titles = [a["text"] for a in spec["layout"]["annotations"]]
+        assert len(titles) == 3
+        assert "Steering wheel angle" in titles[0]
+        assert "Driver torque: torque of the driver's hands" in titles[1].replace("&#x27;", "'")
+        assert "Innovations" in titles[2]
+        names = {axis: [t["name"] for t in spec["traces"] if t["yaxis"] == axis] for axis in ("y", "y3", "y5")}
+        assert names == {
+            "y": ["measured", "95% band", "estimate"], "y3": ["measured", "95% band", "estimate", "true"], "y5": ["angle"],
+        }  # fmt: skip
+        assert spec["layout"]["yaxis"]["title"]["text"] == "°"
+
+    def test_tables_and_words(self, wheel, tmp_path):
+        html = written(wheel, tmp_path)
+        for said in (
+            "Steering wheel angle and driver torque: wheel.csv", "Estimated by toy-wheel from steering wheel angle",
+            "driver torque, RMS", "steering wheel angle, 5% to 95%", "angle: the innovations scatter", "half a second",
+        ):  # fmt: skip
+            assert said in html, said
+        for absent in ("1/ell", "gear shifts", "jerk", "braking"):
+            assert absent not in re.sub(r"<script.*?</script>|<style.*?</style>", "", html, flags=re.S), absent
+
+    def test_a_delay_it_states_is_told(self, tmp_path):
+        estimate = codriver.compile(toy_wheel(settings={"delay_s": 0.123})).run(wheel_log())
+        assert "expected delay</td><td class=num><b>0.123 s" in written(estimate, tmp_path).replace(
+            "<td>", "<td class=num>"
+        )
+
+    def test_a_meaning_is_escaped(self, tmp_path):
+        evil = tuple(Output(o.name, o.unit, o.role, "<script>alert(1)</script>") for o in OUTPUTS)
+        html = written(codriver.compile(toy_wheel(outputs=evil)).run(wheel_log()), tmp_path)
+        assert "<script>alert" not in html
+        assert any("&lt;script&gt;" in a["text"] for a in figure_of(html)["layout"]["annotations"])
+
+
 class TestOddEstimates:
     def test_three_samples(self, log, tmp_path):
         short = log.between(0.0, 0.03)
@@ -248,7 +295,8 @@ class TestStretches:
         holed = log.with_signals(Signal(brake.name, brake.time[kept], brake.values[kept], "Pa", brake.source))
         found = [s for s in not_valid(run("intent-pedals", holed)) if s.span[0] > 10]
         assert "brake pressure missing" in found[0].reason
-        assert found[0].span == pytest.approx((30.5, 33.01), abs=0.03)  # held for 0.5 s
+        assert found[0].span[0] == pytest.approx(30.5, abs=0.03)  # held for 0.5 s
+        assert 33.0 < found[0].span[1] < 34.0  # and settled again
 
 
 class TestNumbers:
@@ -257,6 +305,15 @@ class TestNumbers:
         for ell in (1.0, 2.0):
             program = codriver.compile(codriver.build("kinematic", preset=preset, ell=ell))
             assert expected_lag(program.run(log, stop=1.0)) == pytest.approx(lag / ell, rel=2e-3)
+
+    def test_lag_of_one_s_own_noise_is_known_too(self, log):
+        own = Preset((1e-2, 1e-4, 1e-1, 1.0), (1.0, 1e-2), 2.0, "that of 2017")
+        estimate = codriver.compile(codriver.build("kinematic", preset=own)).run(log, stop=1.0)
+        assert estimate.provenance["preset"] == "own"
+        assert expected_lag(estimate) == pytest.approx(0.456, abs=1e-3)
+
+    def test_lag_of_the_pedals_is_that_of_their_filter(self, estimates):
+        assert expected_lag(estimates["pedals-only"]) == pytest.approx(0.08, abs=1e-3)
 
     def test_lag_is_what_a_ramp_of_jerk_shows(self):
         time = np.arange(0.0, 40.0, 0.01)

@@ -2,7 +2,7 @@
 
 * shown: units and names as people read them
 * stretches: where the estimate is not valid and why
-* panels: what is drawn; figure: as traces and layout; pack: the columns, small
+* parts, panels: what is drawn; figure: as traces and layout; pack: the columns, small
 * numbers: figures; words: explanations; tables: both as HTML
 * page: the whole; write: to a file
 * page.css, plots.js: how it looks, and what draws the plots

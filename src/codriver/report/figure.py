@@ -13,7 +13,7 @@ import numpy as np
 
 from codriver.estimate import Estimate
 from codriver.report.pack import Pack
-from codriver.report.panels import Band, Line, Panel
+from codriver.report.parts import Band, Line, Panel
 from codriver.report.stretches import Span, braking, spans
 
 TITLE, TOP, BOTTOM, LEFT, RIGHT = 34, 26, 46, 64, 58  # pixels

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from codriver.errors import CodriverError
 from codriver.estimate import Estimate
 from codriver.report.panels import SIGMAS, on_ticks
 from codriver.report.shown import clock, number, shown, shown_unit, words
@@ -54,7 +53,8 @@ def figures(estimate: Estimate, told: Summary) -> list[Row]:
             rows.append(Row(f"{words(name)}, mean standard deviation", f"{number(_size(name, found.mean_sd))} {unit}"))
     lag = expected_lag(estimate)
     if lag is not None:
-        rows.append(Row("expected delay of the jerk", f"{number(lag)} s", "slow changes show up about this much late"))
+        what = "expected delay of the jerk" if any(name in estimate for name in JERKS) else "expected delay"
+        rows.append(Row(what, f"{number(lag)} s", "slow changes show up about this much late"))
     if told.gear_shifts is not None:
         rows.append(Row("gear shifts", str(told.gear_shifts)))
     for flag, share in told.shares.items():
@@ -74,27 +74,18 @@ def _distance(metres: float | None) -> str:
 
 
 def expected_lag(estimate: Estimate) -> float | None:
-    """By how much the estimated jerk lags slow changes of the true one, s; None where the design is not known.
+    """By how much the estimate lags slow changes of the true one, s; None where its design does not say.
 
-    The estimation error obeys e' = (A - L C) e + b j' with b = (0, 0, 0, 1), so for slow changes it is
-    -(A - L C)^-1 b j': its last element is the lag, 0.911 / ell for the 2017 noise, 0.627 / ell for that of 2015. For
-    the pedals alone it is that of the differentiating filter.
+    The design knows it (`observers/response.py`): it is the setting delay_s. For the pedals alone it is that of the
+    differentiating filter, whose corner frequency is the setting f_D.
     """
-    from codriver.models import intention_model
-    from codriver.observers import design_scaled_gain
-    from codriver.observers.pedals_only import CORNER_FREQUENCY
-
-    if "intentional_jerk" not in estimate and "longitudinal_jerk" not in estimate:
-        return None
     settings = estimate.provenance
-    if estimate.observer == "pedals-only":
-        return 1 / (2 * np.pi * CORNER_FREQUENCY)
     try:
-        design = design_scaled_gain(settings["preset"], float(settings["dt"]), float(settings["ell"]))
-    except (KeyError, ValueError, CodriverError):
+        if "delay_s" in settings:
+            return float(settings["delay_s"])
+        return 1 / (2 * np.pi * float(settings["f_D"])) if "f_D" in settings else None
+    except (ValueError, ZeroDivisionError):  # a setting of another observer that happens to be called so
         return None
-    model = intention_model()
-    return float(-np.linalg.solve(model.A - design.L @ model.C, np.array([0.0, 0.0, 0.0, 1.0]))[3])
 
 
 @dataclass(frozen=True)

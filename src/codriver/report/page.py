@@ -19,7 +19,7 @@ from codriver.report.pack import packed
 from codriver.report.panels import panels
 from codriver.report.shown import number
 from codriver.report.tables import text
-from codriver.report.words import how_to_read, what
+from codriver.report.words import how_to_read, subject, what
 from codriver.signals import Log
 from codriver.summary import summarise
 
@@ -29,7 +29,6 @@ _HINT = (
     "<p class=screen>Drag across a plot to zoom; all plots follow. Double click for the whole drive. "
     '<a href="#how">How to read this</a></p>'
 )
-_TITLES = {"kinematic": "Vehicle acceleration and jerk"}
 
 
 def page(estimate: Estimate, title: str | None, truth: Log | None, command: str | None) -> str:
@@ -38,7 +37,7 @@ def page(estimate: Estimate, title: str | None, truth: Log | None, command: str 
     origin = start if abs(start) > _FAR else 0.0
     check = estimate.check()
     name = PurePath(estimate.log.source.replace("\\", "/")).name
-    title = title or f"{_TITLES.get(estimate.observer, 'Driver intention')}: {name or 'recording in memory'}"
+    title = title or f"{subject(estimate)}: {name or 'recording in memory'}"
     rows = figures(estimate, summarise(estimate))
     reading = "".join(f"<p>{text(p)}</p>" for p in how_to_read(estimate))
     parts = [

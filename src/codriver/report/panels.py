@@ -2,6 +2,8 @@
 
 speed; pedals, or torques where there are no pedals; gear; acceleration and accelerometer; jerk; slope; innovations.
 A panel appears only if the estimate or its log holds something for it, so each estimator gets the report it can fill.
+What an estimator estimates beyond these stands above them, a panel each: the estimate with its band, and what was measured
+or is true under the same name.
 
 Colours follow those of Okabe and Ito, which people with any kind of colour vision tell apart.
 """
@@ -9,73 +11,33 @@ Colours follow those of Okabe and Ito, which people with any kind of colour visi
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
+from html import escape
 
 import numpy as np
 import numpy.typing as npt
 
 from codriver.estimate import Estimate
-from codriver.report.shown import shown, shown_unit
+from codriver.observers import Output
+from codriver.report.parts import Band, Line, Panel
+from codriver.report.shown import shown, shown_unit, words
 from codriver.signals import Log
 from codriver.signals.signal import Array
+from codriver.summary import measured_on_ticks
 
 BLUE, ORANGE, GREEN, RED, BLACK, GREY = "#0072B2", "#E69F00", "#007A5A", "#C84C00", "#1a1a1a", "#757575"
 PURPLE = "#8E2F86"
-BAND = "rgba(0,114,178,0.22)"
 SIGMAS = 1.96  # half width of a 95% band in standard deviations
 GRAVITY = 9.81
+# Estimates that the panels below draw in a way of their own.
+SPECIAL = (
+    "longitudinal_speed", "intentional_acceleration", "longitudinal_acceleration", "intentional_jerk",
+    "longitudinal_jerk", "acceleration_offset",
+)  # fmt: skip
+# Innovations: what a row is called in the legend, and its colour; the colours of other rows.
+ROWS = {"acceleration": ("accelerometer", ORANGE), "speed": ("speed", BLUE)}
+OTHERS = (BLUE, ORANGE, GREEN, RED, PURPLE, BLACK)
 HELD = 0.5  # s over which an innovation is drawn on
-
-
-@dataclass(frozen=True)
-class Line:
-    """One curve: its name in the legend, its values on the ticks in display units (NaN: a gap), and its looks."""
-
-    name: str
-    values: Array
-    color: str
-    width: float = 1.4
-    dash: str = "solid"
-    steps: bool = False
-    right: bool = False  # belongs to the right axis
-    legend: bool = True
-    reference: bool = False  # the axis is not fitted to it: true values may be wild where no estimator can follow
-
-
-@dataclass(frozen=True)
-class Band:
-    """A band between two curves."""
-
-    name: str
-    low: Array
-    high: Array
-    color: str = BAND
-
-
-@dataclass(frozen=True)
-class Panel:
-    """One plot of the stack.
-
-    Attributes:
-        title: above the plot, with the unit.
-        unit: at the left axis.
-        height: pixels.
-        items: what is drawn, the lowest first.
-        fit: mask of the ticks to which the axis is fitted.
-        right_unit: at the right axis; empty if there is none.
-        guides: dotted horizontal lines.
-        whole: ticks of the axis at whole numbers only.
-    """
-
-    title: str
-    unit: str
-    height: int
-    items: tuple[Line | Band, ...]
-    fit: npt.NDArray[np.bool_] = field(repr=False)
-    right_unit: str = ""
-    guides: tuple[float, ...] = (0.0,)
-    whole: bool = False
 
 
 def panels(estimate: Estimate, truth: Log | None = None) -> list[Panel]:
@@ -83,6 +45,7 @@ def panels(estimate: Estimate, truth: Log | None = None) -> list[Panel]:
     measured = _Measured(estimate)
     reference = _Truth(estimate, truth)
     made = [
+        *(_plain(output, estimate, measured, reference) for output in estimate.estimates if output.name not in SPECIAL),
         _speed(estimate, measured, reference),
         _pedals(estimate, measured),
         _torques(estimate, measured),
@@ -105,14 +68,7 @@ class _Measured:
         return name in self._estimate.log and len(self._estimate.log[name]) > 0
 
     def __call__(self, name: str) -> Array:
-        grid = self._estimate.grid
-        if name not in grid.values:
-            # Not among the estimator's inputs, yet good to see.
-            grid = self._estimate.log.sample([name], grid.dt, start=float(grid.time[0]), stop=float(grid.time[-1]))
-        values = np.full(len(self._estimate.grid), np.nan)
-        n = min(len(grid), values.size)
-        values[:n] = np.where(grid.held[name], grid.values[name], np.nan)[:n]
-        return shown(name, values)
+        return shown(name, measured_on_ticks(self._estimate, name))
 
 
 class _Truth:
@@ -163,6 +119,17 @@ def _estimated(estimate: Estimate, name: str, shape: Callable[[Array], Array] | 
         items.append(Line("estimate, not valid", np.where(inner, np.nan, value), "#9a9a9a", 1.0, legend=False))
     items.append(Line("estimate", np.where(valid, value, np.nan), BLUE, 1.6))
     return items
+
+
+def _plain(output: Output, estimate: Estimate, measured: _Measured, truth: _Truth) -> Panel:
+    """An estimate that has no panel of its own kind."""
+    name = output.name
+    items: list[Line | Band] = [Line("measured", measured(name), GREY, 1.0)] if name in measured else []
+    items += _estimated(estimate, name)
+    items += truth((name, "true", "dot"))
+    # Titles may hold markup, and a meaning is somebody's text.
+    title = escape(words(name).capitalize() + (f": {output.meaning}" if output.meaning else ""))
+    return Panel(title, shown_unit(name, output.unit), 150, tuple(items), estimate.valid)
 
 
 def _speed(estimate: Estimate, measured: _Measured, truth: _Truth) -> Panel | None:
@@ -265,14 +232,11 @@ def _slope(estimate: Estimate, truth: _Truth) -> Panel | None:
 
 def _innovations(estimate: Estimate) -> Panel | None:
     items = []
-    for row, legend, color in (("acceleration", "accelerometer", ORANGE), ("speed", "speed", BLUE)):
-        if f"{row}_innovation" not in estimate or f"{row}_innovation_sd" not in estimate:
+    for number, row in enumerate(estimate.innovations):
+        if row.sd is None:
             continue
-        sd = estimate.columns[f"{row}_innovation_sd"]
-        used = estimate.flag(f"{row}_used") if f"{row}_used" in estimate else np.ones(sd.size, bool)
-        used &= sd > 0
-        ratio = np.where(used, estimate.columns[f"{row}_innovation"] / np.where(used, sd, 1.0), np.nan)
-        carried_on = _carried_on(ratio, round(HELD / estimate.grid.dt))
+        legend, color = ROWS.get(row.row, (words(row.row), OTHERS[number % len(OTHERS)]))
+        carried_on = _carried_on(row.normalised(np.nan), round(HELD / estimate.grid.dt))
         items.append(Line(legend, np.where(estimate.valid, carried_on, np.nan), color, 0.9))
     title = "Innovations: measured less predicted, in standard deviations (sd)"
     return Panel(title, "sd", 110, tuple(items), estimate.valid, guides=(-SIGMAS, SIGMAS)) if items else None

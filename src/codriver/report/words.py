@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from codriver.estimate import Estimate
-from codriver.report.numbers import expected_lag
+from codriver.observers import ESTIMATORS
+from codriver.report.numbers import JERKS, expected_lag
 from codriver.report.shown import words
 
-_WHAT = {
-    "intent-pedals": "The acceleration the driver asks for and its rate of change, from pedals, engine torque, gear, "
-    "accelerometer and speed.",
-    "intent-torque": "The acceleration the driver asks for and its rate of change, from requested and actual torque, "
-    "accelerometer and speed.",
-    "kinematic": "The vehicle's own acceleration and jerk, whoever caused them, from accelerometer and speed alone.",
-    "pedals-only": "Pedals turned into the acceleration and jerk they ask for, without an observer and without a band.",
-}
+
+def subject(estimate: Estimate) -> str:
+    """What the report is about, for its title."""
+    if any(name.startswith("intentional_") for name in estimate):
+        return "Driver intention"
+    if any(name in estimate for name in ("longitudinal_acceleration", "longitudinal_jerk")):
+        return "Vehicle acceleration and jerk"
+    names = [words(output.name) for output in estimate.estimates]
+    return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]])).capitalize() or estimate.observer
 
 
 def what(estimate: Estimate) -> str:
     """One sentence: what was estimated from what."""
+    estimator = ESTIMATORS.get(estimate.observer)
+    if estimator is not None:
+        return f"{estimator.meaning[:1].upper()}{estimator.meaning[1:]}."
     inputs = ", ".join(words(name) for name in estimate.grid.values if name in estimate.log)
-    return _WHAT.get(estimate.observer, f"Estimated by {estimate.observer} from {inputs}.")
+    return f"Estimated by {estimate.observer} from {inputs}."
 
 
 def how_to_read(estimate: Estimate) -> list[str]:
@@ -39,17 +44,22 @@ def how_to_read(estimate: Estimate) -> list[str]:
             "bumps: without pedals or torque these cannot be told apart."
         )
     lag = expected_lag(estimate)
-    if lag is not None and estimate.observer != "pedals-only":
+    if lag is not None and estimate.measured:
         said.append(
-            f"The estimate lags: slow changes of the jerk show up about {lag:.2f} s late. That is the price of a "
-            "smooth estimate; a larger ell makes it quicker and noisier, in inverse proportion."
+            f"The estimate lags: slow changes {'of the jerk ' if _has_jerk(estimate) else ''}show up about {lag:.2f} s late. "
+            "That is the price of a smooth estimate"
+            + (
+                "; a larger ell makes it quicker and noisier, in inverse proportion."
+                if "ell" in estimate.provenance
+                else "."
+            )
         )
     elif lag is not None:
         said.append(
             f"The jerk is the pedals' filtered derivative, about {lag:.2f} s late. There is no band, for there is "
             "no observer to judge its own error; the pedals' noise and all that the road does are in it."
         )
-    if any(o.role == "sd" for o in estimate.outputs):
+    if any(o.role == "sd" and o.name in estimate for o in estimate.outputs):
         said.append(
             "The band holds the true value 95% of the time if the model and the vehicle's parameters are right. "
             "It covers the sensors' noise, not a wrong mass or a wrong coefficient."
@@ -60,15 +70,20 @@ def how_to_read(estimate: Estimate) -> list[str]:
             "change of speed: 1% is 0.1 m/s². So it contains the accelerometer's bias and any tilt of its "
             "mounting; its changes can be trusted more than its level."
         )
-    if "acceleration_innovation" in estimate:
+    if estimate.innovations:
+        span = "1/ell seconds" if "ell" in estimate.provenance else "half a second"
         said.append(
             "Innovations are what the estimator did not foresee. They should stay between the dotted lines 95% of "
             "the time and lean to neither side; where they do not, something happens that the model does not "
-            "know. The verdict's scatter and lean say how large they are one by one and averaged over 1/ell "
-            "seconds, as multiples of what the band allows: 1 is right, less is cautious, much more is too narrow."
+            "know. The verdict's scatter and lean say how large they are one by one and averaged over "
+            f"{span}, as multiples of what the band allows: 1 is right, less is cautious, much more is too narrow."
         )
     said.append(
         "Curves are thin and grey, and the plots hatched, where the estimate is not valid. Drag an axis to "
         "move it; click a name in a legend to hide its curve; the boxes above the plots switch the shadings."
     )
     return said
+
+
+def _has_jerk(estimate: Estimate) -> bool:
+    return any(name in estimate for name in JERKS)
