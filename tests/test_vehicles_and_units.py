@@ -6,7 +6,7 @@ import pytest
 
 import codriver as cd
 from codriver.errors import NamesError, UnitError, VehicleError
-from codriver.logs.names_file import parse_names
+from codriver.logs.names_file import load_names, parse_names
 from codriver.names import VOCABULARY
 from codriver.units import _FAST, to_si
 from codriver.vehicles import Parameter, Vehicle, built_in_vehicles, save_vehicle
@@ -194,3 +194,14 @@ def test_vocabulary_units(entry):
 def test_wrong_names_files(text, said):
     with pytest.raises(NamesError, match=said):
         parse_names(text, "names.toml")
+
+
+@pytest.mark.parametrize(
+    ("load", "kind", "what"), [(cd.load_vehicle, VehicleError, "vehicle file"), (load_names, NamesError, "names file")]
+)
+def test_files_that_cannot_be_read(load, kind, what, tmp_path):
+    with pytest.raises(kind, match="cannot read"):
+        load(tmp_path / "none.toml")
+    (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe\xfa")
+    with pytest.raises(kind, match=f"(?s)is no text.*check that it is the {what}"):
+        load(tmp_path / "bytes.toml")

@@ -12,7 +12,6 @@ valid = "Wheels.Ready"            # optional: values count only where this chann
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from typing import Any
 
 from codriver.errors import NamesError, UnitError
 from codriver.names import VOCABULARY, nearest
+from codriver.toml_file import parse_tables, read_text
 from codriver.units import to_si
 
 _FIELDS = ("source", "unit", "scale", "offset", "sign", "valid")
@@ -115,13 +115,7 @@ def load_names(path: str | Path) -> NamesFile:
     Raises:
         NamesError: it cannot be read, or is wrong; the message lists every fault at once.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise NamesError(f"cannot read {path}: {error.strerror}", "a TOML file", "check the path") from None
-    except UnicodeDecodeError:
-        raise NamesError(f"{path} is no text", "a TOML file in UTF-8", "check that it is the names file") from None
-    return parse_names(text, str(path))
+    return parse_names(read_text(path, "names file", NamesError), str(path))
 
 
 def parse_names(text: str, where: str) -> NamesFile:
@@ -130,10 +124,7 @@ def parse_names(text: str, where: str) -> NamesFile:
     Raises:
         NamesError: listing every fault of the file.
     """
-    try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise NamesError(f"{where} is not TOML: {error}", "a TOML file", "mend the line named") from None
+    tables = parse_tables(text, where, NamesError)
     faults: list[str] = []
     entries = [entry for name, table in tables.items() if (entry := _entry(name, table, faults)) is not None]
     if not entries and not faults:

@@ -17,13 +17,13 @@ parameter would otherwise be silently left out.
 from __future__ import annotations
 
 import math
-import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from codriver.errors import UnitError, VehicleError
 from codriver.names import nearest
+from codriver.toml_file import parse_tables, read_text
 from codriver.units import to_si
 from codriver.vehicles.known import KNOWN
 from codriver.vehicles.vehicle import Parameter, Vehicle
@@ -54,13 +54,7 @@ def load_vehicle(vehicle: str | Path) -> Vehicle:
                 f"did you mean {near}?" if near else "write a vehicle file; docs/vehicles.md shows how",
             )
         return parse_vehicle(file.read_text(encoding="utf-8"), f"built-in {vehicle}")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise VehicleError(f"cannot read {path}: {error.strerror}", "a TOML file", "check the path") from None
-    except UnicodeDecodeError:
-        raise VehicleError(f"{path} is no text", "a TOML file in UTF-8", "check that it is the vehicle file") from None
-    return parse_vehicle(text, str(path))
+    return parse_vehicle(read_text(path, "vehicle file", VehicleError), str(path))
 
 
 def parse_vehicle(text: str, where: str) -> Vehicle:
@@ -69,10 +63,7 @@ def parse_vehicle(text: str, where: str) -> Vehicle:
     Raises:
         VehicleError: listing every fault of the file.
     """
-    try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise VehicleError(f"{where} is not TOML: {error}", "a TOML file", "mend the line named") from None
+    tables = parse_tables(text, where, VehicleError)
     faults = [f"'{key}' is missing at the top" for key in _HEAD if not isinstance(tables.get(key), str)]
     parameters = {}
     for name, table in tables.items():
