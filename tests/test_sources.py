@@ -12,6 +12,7 @@ from codriver.errors import NamesError
 from codriver.live import BusDecoder
 from codriver.logs.mend import mend_clock
 from codriver.logs.names_file import parse_names
+from codriver.logs.wording import counted
 
 DBC = """VERSION ""
 BU_: X
@@ -252,3 +253,9 @@ class TestClock:
         mended, _, notes = mend_clock(time, time)
         assert mended.size == 99
         assert notes == [f"1 sample with a stamp far from its neighbours' left out ({stamp:g} s)"]
+
+
+def test_counts_read_as_words():
+    assert counted(1, "gap") == "1 gap"
+    assert counted(0, "gap") == "0 gaps"
+    assert counted(2, "row", "has", "have") == "2 rows have"

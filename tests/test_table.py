@@ -135,7 +135,7 @@ def test_bad_cells_and_rows_are_left_out_and_told(tmp_path: Path) -> None:
     assert np.isnan(signals["y"].time).sum() == 0
     told = " ".join(faults)
     assert "2 cells" in told
-    assert "1 rows have too few" in told
+    assert "1 row has too few" in told
 
 
 def test_bare_names_find_headers_with_units(tmp_path: Path) -> None:

@@ -194,7 +194,7 @@ def test_asc_bases_stamps_and_lines_of_other_kinds(base, stamps):
     expected = written if stamps == "absolute" else np.cumsum(written)
     np.testing.assert_allclose(frames.time, expected[[2, 4, 8, 9, 10]])
     assert len(faults) == 1
-    assert "1 lines" in faults[0]
+    assert "1 line " in faults[0]
     assert "EngineData" in faults[0]
 
 
@@ -307,7 +307,7 @@ def test_candump_interfaces_and_frames_of_other_kinds():
     assert frames.length.tolist() == [4, 0, 20, 8, 0]
     assert frames.extended.tolist() == [False, True, False, False, False]
     assert frames.bus.tolist() == [0, 1, 2, 2, 2]
-    assert "1 lines" in faults[0]
+    assert "1 line " in faults[0]
     assert "can0, vcan0, can1 are numbered 0, 1, 2" in faults[1]
 
 

@@ -30,6 +30,7 @@ import numpy.typing as npt
 
 from codriver.errors import FormatError
 from codriver.logs.frames import Frames
+from codriver.logs.wording import counted
 
 _SIGNATURE = b"LOBJ"
 _BASE = struct.Struct("<4sHHLL")
@@ -101,7 +102,7 @@ def parse_blf(content: bytes) -> tuple[Frames, list[str]]:
         tail, bad = _parse(tail + block, columns)
         damaged += bad
     if damaged:
-        faults.append(f"{damaged} damaged places between the frames were passed over")
+        faults.append(f"{counted(damaged, 'damaged place')} between the frames passed over")
     if len(tail) >= _BASE.size and not faults:
         faults.append("the file ends within an object: it was cut off; the frames before are read")
     told = struct.unpack_from("<Q", content, 16)[0] if len(content) >= 24 else 0
@@ -123,10 +124,10 @@ def _blocks(content: bytes, faults: list[str]) -> Iterator[bytes | None]:
         found = content.find(_SIGNATURE, position)
         if found < 0 or found + _BASE.size > len(content):
             if len(content) - position >= _BASE.size or found >= 0:
-                faults.append(f"the last {len(content) - position} bytes hold no object: the file was cut off")
+                faults.append(f"no object in the last {counted(len(content) - position, 'byte')}: the file was cut off")
             break
         if found - position > _PADDING:
-            faults.append(f"{found - position} bytes at byte {position} are damaged and were passed over")
+            faults.append(f"{counted(found - position, 'damaged byte')} at byte {position} passed over")
             yield b"".join(parts)
             yield None
             parts, gathered = [], 0

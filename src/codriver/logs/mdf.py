@@ -22,6 +22,7 @@ from codriver.logs.joined import JoinedRecording
 from codriver.logs.mdf_frames import find_bus_groups, read_frames
 from codriver.logs.recording import Channel, RawSignal, Recording
 from codriver.logs.registry import ReadOptions, reader
+from codriver.logs.wording import counted
 
 if TYPE_CHECKING:
     from asammdf import MDF
@@ -226,7 +227,9 @@ def read_mdf(path: Path, options: ReadOptions) -> Recording:
         return decoded
     frames = sum(file.groups[group].channel_group.cycles_nr for group in can)
     if options.dbc is None and decoded.channels():
-        decoded.faults.append(f"{frames} raw CAN frames are left out; a DBC file (--dbc) would decode them")
+        decoded.faults.append(
+            f"{counted(frames, 'raw CAN frame', 'is', 'are')} left out; a DBC file (--dbc) would decode them"
+        )
         return decoded
     form = f"MDF {file.version}, raw CAN frames"
     traced = CanRecording(str(path), form, read_frames(file, can), options.dbc, options.bus, [])

@@ -8,6 +8,7 @@ from math import isinf
 import numpy as np
 import numpy.typing as npt
 
+from codriver.logs.wording import counted
 from codriver.names import VOCABULARY
 from codriver.signals import Signal
 from codriver.signals.signal import Array
@@ -39,20 +40,22 @@ def mend_clock(time: Array, values: Array) -> tuple[Array, Array, list[str]]:
     notes = []
     finite = np.isfinite(time)
     if not finite.all():
-        notes.append(f"{_samples(~finite)} without a time stamp left out")
+        notes.append(f"{counted(int((~finite).sum()), 'sample')} without a time stamp left out")
         time, values = time[finite], values[finite]
     if (np.diff(time) < -RESTART).any():
         astray = _astray(time)
         if astray.any():
             shown = ", ".join(f"{stamp:.10g}" for stamp in time[astray][:3]) + (", ..." if astray.sum() > 3 else "")
-            notes.append(f"{_samples(astray)} with a stamp far from its neighbours' left out ({shown} s)")
+            notes.append(
+                f"{counted(int(astray.sum()), 'sample')} with a stamp far from its neighbours' left out ({shown} s)"
+            )
             time, values = time[~astray], values[~astray]
         runs = np.split(np.arange(time.size), np.flatnonzero(np.diff(time) < -RESTART) + 1)
         if len(runs) > 1:
             kept = max(runs, key=lambda run: float(np.ptp(time[run])))
             left = [_span(time[run]) for run in runs if run is not kept]
             notes.append(
-                f"the clock starts anew {len(runs) - 1} time{'s' if len(runs) > 2 else ''}, as where drives are joined in one "
+                f"the clock starts anew {counted(len(runs) - 1, 'time')}, as where drives are joined in one "
                 f"file: the longest run, {_span(time[kept])}, is kept; left out: {', '.join(left[:4])}"
                 + (f" and {len(left) - 4} more" if len(left) > 4 else "")
             )
@@ -66,8 +69,8 @@ def mend_clock(time: Array, values: Array) -> tuple[Array, Array, list[str]]:
         time, values = time[order], values[order]
     last = np.append(np.diff(time) > 0, True) if time.size else np.zeros(0, bool)
     if not last.all():
-        share = "shares" if (~last).sum() == 1 else "share"
-        notes.append(f"{_samples(~last)} {share} a time stamp with the next; the last of each is kept")
+        double = counted(int((~last).sum()), "sample", "shares", "share")
+        notes.append(f"{double} a time stamp with the next; the last of each is kept")
         time, values = time[last], values[last]
     return time, values, notes
 
@@ -83,12 +86,6 @@ def _astray(time: Array) -> npt.NDArray[np.bool_]:
 def _span(time: Array) -> str:
     """From the first to the last stamp, for messages."""
     return f"{time.min():.10g} to {time.max():.10g} s"
-
-
-def _samples(which: npt.NDArray[np.bool_]) -> str:
-    """How many samples are meant, for messages."""
-    count = int(which.sum())
-    return f"{count} sample" + ("s" if count != 1 else "")
 
 
 def drop_codes(signal: Signal) -> tuple[Signal, list[str]]:
@@ -189,8 +186,9 @@ def find_faults(signal: Signal) -> list[str]:
         long = np.flatnonzero(steps > max(1.0, 20 / signal.rate))
         if long.size:
             where = float(signal.time[long[np.argmax(steps[long])]])
-            plural = "s" if long.size > 1 else ""
-            sentences.append(f"{name}: {long.size} gap{plural}, the longest {steps[long].max():.3g} s at {where:.2f} s")
+            sentences.append(
+                f"{name}: {counted(long.size, 'gap')}, the longest {steps[long].max():.3g} s at {where:.2f} s"
+            )
     if signal.name in _ANALOGUE and len(signal) > 2:
         change = np.flatnonzero(np.diff(signal.values) != 0)
         edges = np.concatenate([[signal.time[0]], signal.time[change + 1], [signal.time[-1]]])

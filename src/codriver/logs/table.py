@@ -19,6 +19,7 @@ from codriver.logs.csv_layout import EMPTY_CELLS, inflate, look
 from codriver.logs.recording import Channel, RawSignal, Recording
 from codriver.logs.registry import ReadOptions, reader
 from codriver.logs.table_clock import find_clock, seconds, split_unit
+from codriver.logs.wording import counted
 from codriver.signals.signal import Array
 
 if TYPE_CHECKING:
@@ -108,7 +109,9 @@ class CsvRecording(TableRecording):
         numbers = {channel.name for channel in channels} | {layout.headers[index]}
         skipped = [header for header in layout.headers if header not in numbers]
         if skipped:
-            self._tell(f"{len(skipped)} columns are no numbers and are left out: {', '.join(skipped[:8])}")
+            self._tell(
+                f"{counted(len(skipped), 'column', 'is', 'are')} not numeric and left out: {', '.join(skipped[:8])}"
+            )
 
     def _read(self, headers: list[str]) -> dict[str, pa.ChunkedArray]:
         import pyarrow as pa
@@ -171,7 +174,9 @@ class CsvRecording(TableRecording):
             expected = f"a table with {len(layout.headers)} columns"
             raise FormatError(f"{self._file}: {error}", expected, "check the file near the place named") from None
         if bad:
-            self._tell(f"{len(bad)} rows have too few or too many cells and are left out, the first: '{bad[0][:60]}'")
+            self._tell(
+                f"{counted(len(bad), 'row', 'has', 'have')} too few or too many cells; left out, the first: '{bad[0][:60]}'"
+            )
         return table
 
     def _tolerant(self, column: pa.ChunkedArray, header: str, kind: pa.DataType) -> pa.ChunkedArray:
@@ -197,9 +202,8 @@ class CsvRecording(TableRecording):
         wrong = pc.filter(column, pc.invert(fits))
         wrong = [cell for cell in wrong.to_pylist() if cell not in (None, "")]
         if wrong:
-            self._tell(
-                f"column '{header}': {len(wrong)} cells are no numbers and are left out, the first: '{wrong[0][:40]}'"
-            )
+            cells = counted(len(wrong), "cell", "is no number", "are no numbers")
+            self._tell(f"column '{header}': {cells}; left out, the first: '{wrong[0][:40]}'")
         return pc.if_else(fits, column, None).cast(pa.float64() if pa.types.is_boolean(kind) else kind)
 
 
@@ -235,7 +239,9 @@ class ParquetRecording(TableRecording):
                 skipped.append(field.name)
         super().__init__(path, "Parquet table", schema.names[index], unit, channels)
         if skipped:
-            self._tell(f"{len(skipped)} columns are no numbers and are left out: {', '.join(skipped[:8])}")
+            self._tell(
+                f"{counted(len(skipped), 'column', 'is', 'are')} not numeric and left out: {', '.join(skipped[:8])}"
+            )
 
     def _read(self, headers: list[str]) -> dict[str, pa.ChunkedArray]:
         import pyarrow as pa

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from codriver.errors import LogError
+from codriver.logs.wording import counted
 from codriver.signals.signal import Array
 
 TIME_UNITS = {
@@ -158,7 +159,9 @@ def _parse(column: Any, name: str, faults: list[str]) -> Any:
     fits = pc.match_substring_regex(column, r"^(\d{4}-\d\d-\d\d([T ]|$).*|\d?\d:\d\d(:\d\d(\.\d{1,9})?)?|[\d.eE+-]+)$")
     good, all_ = pc.sum(fits).as_py() or 0, pc.count(column).as_py()
     if all_ > good > all_ / 2:
-        faults.append(f"time column '{name}': {all_ - good} cells hold no time; their rows are left out")
+        faults.append(
+            f"time column '{name}': {counted(all_ - good, 'cell', 'holds', 'hold')} no time; left out with the row"
+        )
         column = pc.if_else(fits, column, None)
     if pc.all(pc.match_substring_regex(column, r"^\d?\d:")).as_py():  # times of day
         clock = pc.replace_substring_regex(column, r"^(\d:)", r"0\1")

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from codriver.logs.frames import Frames
 from codriver.logs.text_tokens import Flags, Index, Words, blocks
+from codriver.logs.wording import counted
 
 Numbers = npt.NDArray[np.float64]
 
@@ -64,7 +65,11 @@ class Trace:
 
     def result(self) -> tuple[Frames, list[str]]:
         """All frames, and a fault if some lines could not be read."""
-        faults = [f"{self.bad} lines could not be read as CAN frames, such as '{self.example}'"] if self.bad else []
+        faults = (
+            [f"{counted(self.bad, 'line')} could not be read as CAN frames, such as '{self.example}'"]
+            if self.bad
+            else []
+        )
         return Frames.joined(self.parts), faults
 
 
