@@ -19,6 +19,8 @@ from codriver.simulate.truth import truth_log
 
 ELLS = (1.0, 2.0, 3.0)
 AFTER = 1.0  # a shift counts from its start to this many seconds after its end
+# Limits that tests/test_judge.py sets to the mean of three drives, in shifts intent-pedals over kinematic.
+LIMITS = {("model", 1.0): 0.08, ("model", 2.0): 0.15, ("model", 3.0): 0.25, **{("plan", ell): 0.55 for ell in ELLS}}
 
 
 def shifts(truth: cd.Log, time: np.ndarray) -> np.ndarray:
@@ -111,6 +113,20 @@ def main(first: int = 11, last: int = 30) -> None:
             print(table(["ell", *jerks], rows))
     print("\nin gear shifts, intent-pedals over kinematic")
     print(table(["ell", *goals], [[f"{ell:g}", *(show(ratio[ell, goal]) for goal in goals)] for ell in ELLS]))
+    print("\nthe same against the limits")
+    rows = []
+    for (goal, ell), limit in LIMITS.items():
+        found = np.array(ratio[ell, goal])
+        rows.append(
+            [goal, f"{ell:g}", f"{limit:g}", f"{found.mean():.3f}", f"{found.max():.3f}", str((found > limit).sum())]
+        )
+    print(table(["truth", "ell", "limit", "mean", "worst", f"above it of {len(found)}"], rows))
+    print("\nin gear shifts: rms error of intent-pedals over that of always 0, against the plan")
+    rows = []
+    for ell in ELLS:
+        ours, zero = (np.array(error[ell, "plan", name, "shift"]) for name in ("intent-pedals", "zero"))
+        rows.append([f"{ell:g}", show(list(ours / zero)), str((ours > zero).sum())])
+    print(table(["ell", "ratio", "drives above 1"], rows))
     print("\nbest correlation with the planned jerk, and its lag, s")
     rows = []
     for ell in ELLS:
