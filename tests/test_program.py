@@ -78,6 +78,14 @@ def test_state_of_another_design_is_refused():
         cd.compile(cd.build("kinematic", dt=0.01, ell=3)).live().restore(slow)
 
 
+def test_state_of_another_vehicle_of_that_name_is_refused(car):
+    """The vehicle's numbers are constants of the step, and the step's fingerprint is in the state."""
+    saved = cd.compile(cd.build("intent-pedals", car)).live().save()
+    heavy = car.with_parameter("mass", 1.1 * car.number("mass"))
+    with pytest.raises(UsageError, match="step ="):
+        cd.compile(cd.build("intent-pedals", heavy)).live().restore(saved)
+
+
 def test_a_drive_in_pieces(car, demo):
     """Piece by piece, with the carry handed on: the bits of the whole."""
     program = cd.compile(cd.build("intent-pedals", car))

@@ -183,7 +183,11 @@ class Stepper:
     def save(self) -> str:
         """The state as JSON text with hexadecimal floats: restored, it continues with the same bits."""
         exact = {name: value.hex() for name, value in self.carry.items()}
-        return json.dumps({"design": provenance(self._program.observer), "carry": exact})
+        return json.dumps({"design": self._design(), "carry": exact})
+
+    def _design(self) -> dict[str, str]:
+        """What a saved state must agree with: the settings, and the step itself (a vehicle's numbers are in it)."""
+        return {**provenance(self._program.observer), "step": self._program.recorded.fingerprint()}
 
     def restore(self, text: str) -> None:
         """Continue from a saved state.
@@ -197,7 +201,7 @@ class Stepper:
             carry = {name: float.fromhex(value) for name, value in saved["carry"].items()}
         except (ValueError, KeyError, TypeError, AttributeError):
             raise UsageError("text that is no saved state", "what Stepper.save gave", "save again") from None
-        mine = provenance(self._program.observer)
+        mine = self._design()
         if design != mine or list(carry) != list(self._program.recorded.carry):
             differ = [key for key in {**mine, **design} if mine.get(key) != design.get(key)]
             said = [", ".join(f"{key} = {d.get(key)}" for key in differ) or "another carry" for d in (design, mine)]

@@ -59,6 +59,12 @@ class Recorded:
     output_results: tuple[int, ...]
     function: Any
 
+    def fingerprint(self) -> str:
+        """Sixteen hexadecimal digits that change with any operation or constant of the step."""
+        from hashlib import sha256
+
+        return sha256(repr((self.carry, self.inputs, self.outputs, self.instructions)).encode()).hexdigest()[:16]
+
     def operations(self) -> int:
         """How many arithmetic operations one step takes; its cost, counted and not timed."""
         return sum(i.kind not in ("constant", "carry", "input") for i in self.instructions)
