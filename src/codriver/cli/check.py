@@ -56,12 +56,12 @@ def names(
 
     mapping = load_names(file)
     table = Table(box=None, pad_edge=False)
-    for column in ("standard name", "unit inside", "source", "unit there", "scale", "offset", "sign"):
+    for column in ("standard name", "unit inside", "source", "unit there", "scale", "offset", "sign", "valid where"):
         table.add_column(column)
     for entry in mapping.entries.values():
         table.add_row(
             entry.name, VOCABULARY[entry.name].unit, escape(" + ".join(entry.source)), entry.unit or "(as the source says)",
-            f"{entry.scale:g}", f"{entry.offset:g}", f"{entry.sign:+d}",
+            f"{entry.scale:g}", f"{entry.offset:g}", f"{entry.sign:+d}", escape(entry.valid or "-"),
         )  # fmt: skip
     console().print(table)
 
