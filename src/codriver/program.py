@@ -207,7 +207,7 @@ class Stepper:
             said = [", ".join(f"{key} = {d.get(key)}" for key in differ) or "another carry" for d in (design, mine)]
             raise UsageError(
                 f"a state saved with {said[0]}", f"one saved with {said[1]}",
-                "restore it into a stepper of the same design and version",
+                "restore it into a stepper of the same design, outputs and version",
             )  # fmt: skip
         self._carry[: len(carry)] = list(carry.values())
 
