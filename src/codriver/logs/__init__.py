@@ -1,7 +1,7 @@
 """Readers and writers, one file a format."""
 
 from codriver.logs.read import open_recording, read
-from codriver.logs.recording import Channel, Recording
+from codriver.logs.recording import Recording, SourceChannel
 from codriver.logs.registry import formats, reader
 
-__all__ = ["Channel", "Recording", "formats", "open_recording", "read", "reader"]
+__all__ = ["Recording", "SourceChannel", "formats", "open_recording", "read", "reader"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from codriver.logs.names_file import Entry, NamesFile
-from codriver.logs.recording import Channel, RawSignal, Recording
+from codriver.logs.recording import RawSignal, Recording, SourceChannel
 from codriver.signals.signal import Array
 
 Fetch = Callable[[], tuple[Array, Array]]
@@ -22,15 +22,15 @@ class ArrayRecording(Recording):
     def __init__(self, path: str, format: str) -> None:
         self.path, self.format = path, format
         self.faults: list[str] = []
-        self._channels: dict[str, Channel] = {}
+        self._channels: dict[str, SourceChannel] = {}
         self._fetch: dict[str, Fetch] = {}
 
     def add(self, name: str, unit: str, comment: str, fetch: Fetch) -> None:
         """Add a channel."""
-        self._channels[name] = Channel(name, unit, comment)
+        self._channels[name] = SourceChannel(name, unit, comment)
         self._fetch[name] = fetch
 
-    def channels(self) -> Mapping[str, Channel]:
+    def channels(self) -> Mapping[str, SourceChannel]:
         """All channels."""
         return self._channels
 
@@ -41,7 +41,7 @@ class ArrayRecording(Recording):
         }
 
 
-def choose_names(candidates: Sequence[Entry], channels: Mapping[str, Channel], where: str) -> NamesFile:
+def choose_names(candidates: Sequence[Entry], channels: Mapping[str, SourceChannel], where: str) -> NamesFile:
     """The mapping of a known layout: for each standard name the first entry whose sources are all there."""
     chosen: dict[str, Entry] = {}
     for entry in candidates:

@@ -15,7 +15,7 @@ from codriver.logs.can_bits import take
 from codriver.logs.can_streams import Stream, find_streams, list_streams, name_identifier
 from codriver.logs.dbc import Database, MessageLayout, decode, load_database
 from codriver.logs.frames import Frames
-from codriver.logs.recording import Channel, RawSignal, Recording
+from codriver.logs.recording import RawSignal, Recording, SourceChannel
 
 
 class CanRecording(Recording):
@@ -64,10 +64,10 @@ class CanRecording(Recording):
                 "give the DBC file that belongs to this bus of this vehicle",
             )
 
-    def channels(self) -> Mapping[str, Channel]:
+    def channels(self) -> Mapping[str, SourceChannel]:
         """All signals of the messages in the trace, as "Message.Signal"."""
         return {
-            f"{name}.{signal.name}": Channel(f"{name}.{signal.name}", signal.unit, signal.comment)
+            f"{name}.{signal.name}": SourceChannel(f"{name}.{signal.name}", signal.unit, signal.comment)
             for name in self._found
             for signal in self._messages[name].signals.values()
         }

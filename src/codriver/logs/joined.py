@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from codriver.logs.names_file import NamesFile
-from codriver.logs.recording import Channel, RawSignal, Recording
+from codriver.logs.recording import RawSignal, Recording, SourceChannel
 
 
 class JoinedRecording(Recording):
@@ -25,7 +25,7 @@ class JoinedRecording(Recording):
         self._parts = tuple(parts)
         self.faults = [fault for part in self._parts for fault in part.faults]
 
-    def channels(self) -> Mapping[str, Channel]:
+    def channels(self) -> Mapping[str, SourceChannel]:
         """The channels of all parts."""
         return {name: channel for part in reversed(self._parts) for name, channel in part.channels().items()}
 

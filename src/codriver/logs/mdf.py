@@ -20,7 +20,7 @@ import numpy as np
 from codriver.errors import FormatError, LogError
 from codriver.logs.joined import JoinedRecording
 from codriver.logs.mdf_frames import find_bus_groups, read_frames
-from codriver.logs.recording import Channel, RawSignal, Recording
+from codriver.logs.recording import RawSignal, Recording, SourceChannel
 from codriver.logs.registry import ReadOptions, reader
 from codriver.logs.wording import counted
 
@@ -46,7 +46,7 @@ class MdfRecording(Recording):
         self.path, self.format = str(path), f"MDF {file.version}"
         self.faults: list[str] = []
         self._file = file
-        self._channels: dict[str, Channel] = {}
+        self._channels: dict[str, SourceChannel] = {}
         self._places: dict[str, tuple[int, int]] = {}
         other = set()
         for group, index, channel in _numeric(file, left_out):
@@ -54,14 +54,14 @@ class MdfRecording(Recording):
                 other.add(_group_name(file, group))
                 continue
             name = self._free_name(str(channel.name), _group_name(file, group))
-            self._channels[name] = Channel(name, _unit(channel), _plain(channel.comment))
+            self._channels[name] = SourceChannel(name, _unit(channel), _plain(channel.comment))
             self._places[name] = group, index
         if other:
             self.faults.append(
                 f"groups over angle, distance or index, no time, are left out: {', '.join(sorted(other))}"
             )
 
-    def channels(self) -> Mapping[str, Channel]:
+    def channels(self) -> Mapping[str, SourceChannel]:
         """The numeric channels that have samples."""
         return self._channels
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Channel:
+class SourceChannel:
     """A channel of a recording, by the source's own name.
 
     Attributes:
@@ -56,7 +56,7 @@ class Recording(ABC):
     default_names: NamesFile | None = None
 
     @abstractmethod
-    def channels(self) -> Mapping[str, Channel]:
+    def channels(self) -> Mapping[str, SourceChannel]:
         """All channels that have samples, by the source's own name."""
 
     @abstractmethod

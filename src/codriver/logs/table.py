@@ -16,7 +16,7 @@ import numpy as np
 
 from codriver.errors import FormatError, LogError
 from codriver.logs.csv_layout import EMPTY_CELLS, inflate, look
-from codriver.logs.recording import Channel, RawSignal, Recording
+from codriver.logs.recording import RawSignal, Recording, SourceChannel
 from codriver.logs.registry import ReadOptions, reader
 from codriver.logs.table_clock import find_clock, seconds, split_unit
 from codriver.logs.wording import counted
@@ -31,13 +31,13 @@ _MOSTLY_EMPTY = 1 / 3
 class TableRecording(Recording):
     """A table: a clock and columns beside it."""
 
-    def __init__(self, path: Path, form: str, clock: str, unit: str, channels: Sequence[Channel]) -> None:
+    def __init__(self, path: Path, form: str, clock: str, unit: str, channels: Sequence[SourceChannel]) -> None:
         self.path, self.format = str(path), form
         self.faults: list[str] = []
         self._clock, self._clock_unit = clock, unit
         self._channels = {channel.name: channel for channel in channels}
 
-    def channels(self) -> Mapping[str, Channel]:
+    def channels(self) -> Mapping[str, SourceChannel]:
         """The columns of numbers, by header; the time column is not among them."""
         return self._channels
 
@@ -99,7 +99,7 @@ class CsvRecording(TableRecording):
         dates = [kind == "text" for kind in layout.kinds]
         index, unit = find_clock(layout.headers, dates, str(path))
         channels = [
-            Channel(header, unit)
+            SourceChannel(header, unit)
             for i, (header, unit, kind) in enumerate(zip(layout.headers, layout.units, layout.kinds, strict=True))
             if kind != "text" and i != index
         ]
@@ -234,7 +234,7 @@ class ParquetRecording(TableRecording):
                 unit = unit or _note(field, "unit")
             elif any(test(field.type) for test in numeric):
                 own = _note(field, "unit") or split_unit(field.name)[1]
-                channels.append(Channel(field.name, own, _note(field, "comment")))
+                channels.append(SourceChannel(field.name, own, _note(field, "comment")))
             elif not field.name.startswith("__index_level"):
                 skipped.append(field.name)
         super().__init__(path, "Parquet table", schema.names[index], unit, channels)

@@ -11,7 +11,7 @@ import numpy as np
 from codriver.errors import CodriverError
 from codriver.export.golden import golden_inputs
 from codriver.kernel.record import interpret
-from codriver.logs.recording import Channel, Recording
+from codriver.logs.recording import Recording, SourceChannel
 from codriver.logs.registry import ReaderFunction, ReadOptions
 from codriver.names import VOCABULARY
 from codriver.observers.observer import Observer
@@ -98,7 +98,7 @@ def check_reader(function: ReaderFunction, good: Path, broken: Iterable[Path], d
     assert recording.format, "format must say what the file is"
     channels = recording.channels()
     assert channels, "no channels"
-    assert all(isinstance(c, Channel) and c.name == key for key, c in channels.items()), (
+    assert all(isinstance(c, SourceChannel) and c.name == key for key, c in channels.items()), (
         "channels are by their own names"
     )
     loaded = recording.load([*channels, "no such channel"])
