@@ -532,7 +532,8 @@ class TestEmpty:
 
     @pytest.mark.parametrize(
         ("name", "content"),
-        [(name, b"") for name in SUFFIXES] + [(name, gzip.compress(b"", mtime=0)) for name in SUFFIXES if name.endswith(".gz")],
+        [(name, b"") for name in SUFFIXES]
+        + [(name, gzip.compress(b"", mtime=0)) for name in SUFFIXES if name.endswith(".gz")],
     )
     def test_empty_file(self, run, estimate, demo_files, tmp_path, name, content):
         (tmp_path / name).write_bytes(content)
