@@ -779,7 +779,7 @@ class TestField:
 def test_demo(run, tmp_path):
     ran = run("demo", "--out", tmp_path / "demo")
     assert ran.code == 0
-    names = {"car.dbc", "drive.blf", "estimate.parquet", "names.toml", "report.html", "truth.parquet"}
+    names = {"car.dbc", "drive.blf", "estimate.parquet", "logger.csv", "names.toml", "report.html", "truth.parquet"}
     assert {p.name for p in (tmp_path / "demo").iterdir()} == names
     assert "$ codriver estimate intent " in ran.out
     assert "against the simulated truth" in ran.out

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from codriver.errors import UsageError
+from codriver.errors import LogError, UsageError
 from codriver.simulate.bus import BusParameters, Hole, transmit
 from codriver.simulate.can_layout import Field, Message, dbc_text, encode
 from codriver.simulate.car import GRAVITY, Car
@@ -408,8 +408,8 @@ def test_written_files_read_back(demo, tmp_path):
     from codriver.logs import read
 
     files = write_demo(tmp_path / "demo", seed=1)
-    assert {path.name for path in (files.log, files.dbc, files.names, files.truth)} == {
-        "drive.blf", "car.dbc", "names.toml", "truth.parquet",
+    assert {path.name for path in (files.log, files.dbc, files.names, files.truth, files.logger)} == {
+        "drive.blf", "car.dbc", "names.toml", "truth.parquet", "logger.csv",
     }  # fmt: skip
     database = cantools.database.load_file(files.dbc)
     with can.LogReader(str(files.log)) as reader:
@@ -435,3 +435,53 @@ def test_written_files_read_back(demo, tmp_path):
         assert error[moving].std() < 1.15 * sd, name
     table = read(files.truth)
     np.testing.assert_allclose(table["intentional_jerk"].values, demo.truth["intentional_jerk"].values)
+
+
+# ---- the demo's folder
+
+
+def test_demo_replaces_only_a_demo(demo, tmp_path, monkeypatch):
+    monkeypatch.setattr("codriver.simulate.demo.demo_drive", lambda seed: demo)
+    foreign = tmp_path / "foreign"
+    foreign.mkdir()
+    (foreign / "names.toml").write_text("mine")
+    with pytest.raises(UsageError, match="no demo"):
+        write_demo(foreign)
+    assert [(p.name, p.read_text()) for p in foreign.iterdir()] == [("names.toml", "mine")]
+    with pytest.raises(UsageError, match="is a file"):
+        write_demo(foreign / "names.toml")
+    (tmp_path / "own").mkdir()
+    files = write_demo(tmp_path / "own")
+    (tmp_path / "own" / "report.html").write_text("of the demo")
+    files.names.write_text("changed")
+    write_demo(tmp_path / "own")
+    assert files.names.read_text(encoding="utf-8") == names_text()
+
+
+def test_demo_is_whole_or_nothing(demo, tmp_path, monkeypatch):
+    monkeypatch.setattr("codriver.simulate.demo.demo_drive", lambda seed: demo)
+
+    def full(path, frames):
+        path.write_bytes(b"LOGG")
+        raise OSError(28, "No space left on device")
+
+    files = write_demo(tmp_path / "demo")
+    before = files.log.read_bytes()
+    monkeypatch.setattr("codriver.simulate.demo.write_trace", full)
+    for folder in ("new", "demo"):
+        with pytest.raises(LogError, match="No space left on device"):
+            write_demo(tmp_path / folder)
+    assert [p.name for p in tmp_path.iterdir()] == ["demo"]
+    assert files.log.read_bytes() == before
+
+
+def test_logger_of_the_demo(demo, tmp_path, monkeypatch):
+    monkeypatch.setattr("codriver.simulate.demo.demo_drive", lambda seed: demo)
+    path = write_demo(tmp_path / "demo").logger
+    assert path.read_text().splitlines()[0] == "t,VehSpd,AccX_g,TqEng,TqDrv,GearAct"
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    np.testing.assert_allclose(rows[:, 0], 0.05 + 0.02 * np.arange(5998), atol=1e-9)
+    acceleration = demo.measured["longitudinal_acceleration"]
+    newest = np.searchsorted(acceleration.time, rows[:, 0] + 1e-9, side="right") - 1
+    np.testing.assert_allclose(rows[:, 2] * -GRAVITY, acceleration.values[newest], atol=5e-4)
+    assert np.array_equal(rows[:, 5], rows[:, 5].round())

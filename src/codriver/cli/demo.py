@@ -24,12 +24,9 @@ def demo(
 
     from codriver.cli.estimate import estimate_file
     from codriver.cli.terminal import console, working
-    from codriver.errors import UsageError
     from codriver.logs import read
     from codriver.simulate import write_demo
 
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"--out {out} is a file", "a folder, or a name that is free", "choose another --out")
     screen = console()
     with working(True, 1) as stage:
         stage("simulating three minutes of driving")
@@ -39,7 +36,10 @@ def demo(
         "estimate", "intent", str(files.log), "--dbc", str(files.dbc), "--names", str(files.names),
         "--vehicle", "bisoffi2017", "-o", str(result), "--report", str(report),
     ]  # fmt: skip
-    screen.print(f"wrote {files.log}, {files.dbc}, {files.names} and the truth, {files.truth}\n", markup=False)
+    screen.print(
+        f"wrote {files.log}, {files.dbc}, {files.names}, a logger's {files.logger} and the truth, {files.truth}\n",
+        markup=False,
+    )
     screen.print(f"$ codriver {shlex.join(command)}\n", markup=False)
     sys.argv = ["codriver", *command]  # provenance names the command that makes this result
     truth = read(files.truth)

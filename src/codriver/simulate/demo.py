@@ -7,13 +7,19 @@ drive.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import shutil
+import tempfile
+from dataclasses import dataclass, fields
 from pathlib import Path
 
+import numpy as np
+
+from codriver.errors import LogError, UsageError
 from codriver.logs.frames import Frames
 from codriver.signals import Log
 from codriver.simulate.bus import BusParameters, Hole, transmit, write_trace
 from codriver.simulate.can_layout import dbc_text
+from codriver.simulate.car import GRAVITY
 from codriver.simulate.drive import Trace, drive
 from codriver.simulate.network import MESSAGES, names_text
 from codriver.simulate.road import demo_road
@@ -22,6 +28,15 @@ from codriver.simulate.truth import truth_log
 
 DURATION = 180.0  # s
 HOLE = Hole("Wheels", 41.0, 1.2)
+_OWN = ("car.dbc", "drive.blf", "truth.parquet")  # a folder with these is a demo
+# The logger's columns: name, signal, factor to its unit, decimals. It counts braking as positive.
+_LOGGER = (
+    ("VehSpd", "longitudinal_speed", 3.6, 2),
+    ("AccX_g", "longitudinal_acceleration", -1 / GRAVITY, 4),
+    ("TqEng", "engine_torque", 1.0, 1),
+    ("TqDrv", "engine_torque_request", 1.0, 1),
+    ("GearAct", "gear", 1.0, 0),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +58,13 @@ class DemoDrive:
 
 @dataclass(frozen=True)
 class DemoFiles:
-    """Paths of a written demo: `log` (BLF), its `dbc` and `names`, and the `truth` (Parquet)."""
+    """Paths of a written demo: `log` (BLF), its `dbc` and `names`, the `truth` (Parquet), and a `logger`'s CSV."""
 
     log: Path
     dbc: Path
     names: Path
     truth: Path
+    logger: Path
 
 
 def demo_drive(seed: int = 1) -> DemoDrive:
@@ -60,21 +76,79 @@ def demo_drive(seed: int = 1) -> DemoDrive:
 
 
 def write_demo(folder: str | Path, seed: int = 1) -> DemoFiles:
-    """Simulate the demo drive and write drive.blf, car.dbc, names.toml, truth.parquet into a folder, made if need be.
+    """Simulate the demo drive and write it into a folder, made if need be.
+
+    The files are drive.blf, car.dbc, names.toml, truth.parquet and logger.csv. They are written whole or not at all:
+    everything goes to a temporary folder first.
 
     Raises:
+        UsageError: the folder holds files, and not those of a demo.
         LogError: a file cannot be written.
     """
+    folder = Path(folder)
+    _refuse_foreign(folder)
+    demo = demo_drive(seed)
+    files = _files(folder)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".codriver-") as scratch:
+            drafts = _files(Path(scratch))
+            _write(demo, drafts, seed)
+            folder.mkdir(exist_ok=True)
+            for field in fields(DemoFiles):
+                shutil.move(str(getattr(drafts, field.name)), getattr(files, field.name))
+    except (OSError, LogError) as error:
+        # A LogError names the temporary folder; its cause is the system's.
+        cause = error if isinstance(error, OSError) else error.__cause__
+        said = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause or error)
+        raise LogError(
+            f"cannot write the demo into {folder}: {said}",
+            "room on the disk and the right to write",
+            "remove the cause, or choose another --out",
+        ) from error
+    return files
+
+
+def _files(folder: Path) -> DemoFiles:
+    """The files of a demo in a folder."""
+    names = ("drive.blf", "car.dbc", "names.toml", "truth.parquet", "logger.csv")
+    return DemoFiles(*(folder / name for name in names))
+
+
+def _refuse_foreign(folder: Path) -> None:
+    """A demo replaces files only where an earlier one wrote them.
+
+    Raises:
+        UsageError: the folder is a file, or holds files and no demo.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"--out {folder} is a file", "a folder, or a name that is free", "choose another --out")
+    if folder.is_dir() and any(folder.iterdir()) and not all((folder / name).is_file() for name in _OWN):
+        raise UsageError(
+            f"--out {folder} holds files that are no demo",
+            "a folder that is new, empty or an earlier demo's",
+            "choose another --out",
+        )
+
+
+def _write(demo: DemoDrive, files: DemoFiles, seed: int) -> None:
+    """All files of a demo."""
     from codriver.logs.write import Column, write_table
 
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    demo = demo_drive(seed)
-    files = DemoFiles(folder / "drive.blf", folder / "car.dbc", folder / "names.toml", folder / "truth.parquet")
     write_trace(files.log, demo.frames)
     files.dbc.write_text(dbc_text(MESSAGES, "simulated car"), encoding="utf-8")
     files.names.write_text(names_text(), encoding="utf-8")
     clock = demo.truth["longitudinal_speed"].time
     columns = [Column(signal.name, signal.values, signal.unit) for signal in demo.truth.values()]
     write_table(files.truth, clock, columns, {"source": demo.truth.source, "seed": str(seed)})
-    return files
+    files.logger.write_text(_logger_text(demo.measured), encoding="utf-8")
+
+
+def _logger_text(measured: Log) -> str:
+    """Two minutes at 50 Hz as a logger of its own kind writes them: no standard names, no units, a sign turned."""
+    grid = measured.sample([signal for _, signal, _, _ in _LOGGER], 0.02, start=0.05, stop=120.0)
+    # Adding 0 turns -0 into 0.
+    columns = [np.round(grid.values[signal] * factor, decimals) + 0.0 for _, signal, factor, decimals in _LOGGER]
+    form = ",".join(["{:.2f}", *(f"{{:.{decimals}f}}" for *_, decimals in _LOGGER)])
+    rows = [form.format(*row) for row in zip(grid.time.tolist(), *(c.tolist() for c in columns), strict=True)]
+    return "\n".join([",".join(["t", *(name for name, *_ in _LOGGER)]), *rows, ""])
