@@ -10,7 +10,7 @@ import pytest
 import codriver as cd
 from codriver.errors import NamesError
 from codriver.live import BusDecoder
-from codriver.logs.mend import mend_clock
+from codriver.logs.mend import drop_codes, mend_clock
 from codriver.logs.names_file import parse_names
 from codriver.logs.wording import counted
 
@@ -230,7 +230,7 @@ class TestClock:
         speed = log["longitudinal_speed"]
         assert (speed.time[0], speed.time[-1]) == (0, 29.9)
         np.testing.assert_allclose(speed.values, 20)
-        assert "the clock starts anew 1 time" in told
+        assert "the clock starts anew or leaps 1 time" in told
         assert "the longest run, 0 to 29.9 s, is kept; left out: 0 to 19.9 s" in told
 
     @pytest.fixture
@@ -259,3 +259,27 @@ def test_counts_read_as_words():
     assert counted(1, "gap") == "1 gap"
     assert counted(0, "gap") == "0 gaps"
     assert counted(2, "row", "has", "have") == "2 rows have"
+
+
+def test_a_leap_of_the_clock_does_not_fill_the_memory():
+    """A second of stamps 35 days ahead, and a half of another day: the run that fits is kept, and it is told."""
+
+    time = np.arange(6000) / 100
+    ahead = np.where((time >= 30) & (time < 31), time + 3e6, time)
+    kept, _, notes = mend_clock(ahead, np.arange(6000.0))
+    assert kept.size == 5900
+    assert kept.max() < 60
+    assert "leaps" in notes[0]
+    days = np.where(time >= 40, time + 864000, time)
+    kept, values, notes = mend_clock(days, np.arange(6000.0))
+    assert values.tolist() == list(range(4000))
+    assert "left out" in notes[0]
+
+
+def test_absurd_values_are_missing():
+
+    values = np.full(6000, 10.0)
+    values[[100, 2000]] = 1e30, -4e9
+    signal, notes = drop_codes(cd.Signal("longitudinal_speed", np.arange(6000) / 100, values, "m/s"))
+    assert np.isnan(signal.values).sum() == 2
+    assert "2 values of up to 1e+30 m/s" in notes[0]

@@ -190,3 +190,29 @@ def test_coverage_on_simulated_drives(ell, low, high, car):
         inside = np.abs(error) <= 1.96 * estimate.sd("intentional_jerk")
         shares.append(inside[estimate.valid].mean())
     assert low < np.mean(shares) < high, shares
+
+
+def test_units_betray_themselves():
+    """Each wrong unit is named, the right way round, and is bad."""
+    log, _ = motion_log(120)
+    v, a = log["longitudinal_speed"], log["longitudinal_acceleration"]
+    for factor, said in ((3.6, "km/h read as m/s"), (1.609, "km/h read as mph"), (0.621, "mph read as km/h")):
+        check = kinematic(log.with_signals(cd.Signal(v.name, v.time, factor * v.values, v.unit))).check()
+        assert said in found(check, "bad"), factor
+    check = kinematic(log.with_signals(cd.Signal(a.name, a.time, a.values / 9.80665, a.unit))).check()
+    assert "g read as m/s^2" in found(check, "bad")
+
+
+def test_stuck_speed():
+    log, _ = motion_log(120)
+    v = log["longitudinal_speed"]
+    check = kinematic(log.with_signals(cd.Signal(v.name, v.time, np.full(v.time.size, 10.0), v.unit))).check()
+    assert "stuck" in found(check, "bad")
+
+
+def test_spikes_in_the_speed_are_told(demo):
+    log, _ = motion_log(120)
+    v = log["longitudinal_speed"]
+    spikes = v.values + 20.0 * (np.random.default_rng(0).random(v.time.size) < 0.01)
+    assert "spikes" in found(kinematic(log.with_signals(cd.Signal(v.name, v.time, spikes, v.unit))).check(), "warn")
+    assert "spikes" not in str(kinematic(demo.measured).check().findings)

@@ -21,6 +21,7 @@ from codriver.errors import LogError, MissingSignal, UsageError
 from codriver.estimate import Estimate
 from codriver.kernel.llvm import Compiled, compile_loop
 from codriver.kernel.record import Recorded
+from codriver.names import VOCABULARY
 from codriver.observers.observer import Observer
 from codriver.signals import Grid, Log
 from codriver.signals.signal import Array
@@ -169,8 +170,17 @@ class Stepper:
         """One step from what is there now: a channel that is absent or not finite is not ok.
 
         Args:
-            values: by standard name: inputs as last known, measurements only on the tick they arrived.
+            values: by standard name: inputs as last known, measurements only on the tick they arrived. Names that the
+                observer does not use are left out.
+
+        Raises:
+            UsageError: a name is no standard name.
         """
+        strange = [name for name in values if name not in self._channels and name not in VOCABULARY]
+        if strange:
+            raise UsageError(
+                f"{strange} are no standard signal names", f"some of {', '.join(self._channels)}", "see docs/names.md"
+            )
         numbers = {name: float(values.get(name, float("nan"))) for name in self._channels}
         there = [isfinite(numbers[flag.channel]) for flag in self._flags]
         return dict(zip(self.outputs, self([*numbers.values(), *there]), strict=True))

@@ -21,7 +21,10 @@ CODES_AT_MOST = 3
 OTHER_CLOCK = 3600.0
 # A clock that steps back by more than this began anew; by less, samples merely swapped places. s.
 RESTART = 1.0
+# And one that leaps ahead by more than this is another clock, or another day. s.
+LEAP = 3 * 3600.0
 LATE = 2.0  # s
+ABSURD = 10.0  # times the largest value that the quantity can plausibly have
 REST_PRESSURE = 0.3e5  # Pa
 _ANALOGUE = {"longitudinal_acceleration", "lateral_acceleration", "yaw_rate", "roll_rate", "pitch_rate"}
 
@@ -50,16 +53,16 @@ def mend_clock(time: Array, values: Array) -> tuple[Array, Array, list[str]]:
                 f"{counted(int(astray.sum()), 'sample')} with a stamp far from its neighbours' left out ({shown} s)"
             )
             time, values = time[~astray], values[~astray]
-        runs = np.split(np.arange(time.size), np.flatnonzero(np.diff(time) < -RESTART) + 1)
-        if len(runs) > 1:
-            kept = max(runs, key=lambda run: float(np.ptp(time[run])))
-            left = [_span(time[run]) for run in runs if run is not kept]
-            notes.append(
-                f"the clock starts anew {counted(len(runs) - 1, 'time')}, as where drives are joined in one "
-                f"file: the longest run, {_span(time[kept])}, is kept; left out: {', '.join(left[:4])}"
-                + (f" and {len(left) - 4} more" if len(left) > 4 else "")
-            )
-            time, values = time[kept], values[kept]
+    if _breaks(time).size:
+        runs = np.split(np.arange(time.size), _breaks(time) + 1)
+        kept = _joined(time, runs)
+        left = [_span(time[run]) for run in runs if not np.isin(run[0], kept)]
+        notes.append(
+            f"the clock starts anew or leaps {counted(len(runs) - 1, 'time')}, as where drives are joined in one "
+            f"file: the longest run, {_span(time[kept])}, is kept; left out: {', '.join(left[:4])}"
+            + (f" and {len(left) - 4} more" if len(left) > 4 else "")
+        )
+        time, values = time[kept], values[kept]
     backwards = np.flatnonzero(np.diff(time) < 0)
     if backwards.size:
         worst = float((time[backwards] - time[backwards + 1]).max())
@@ -73,6 +76,25 @@ def mend_clock(time: Array, values: Array) -> tuple[Array, Array, list[str]]:
         notes.append(f"{double} a time stamp with the next; the last of each is kept")
         time, values = time[last], values[last]
     return time, values, notes
+
+
+def _breaks(time: Array) -> npt.NDArray[np.intp]:
+    """Indices after which the clock starts anew or leaps."""
+    steps = np.diff(time)
+    return np.flatnonzero((steps < -RESTART) | (steps > LEAP))
+
+
+def _joined(time: Array, runs: list[npt.NDArray[np.intp]]) -> npt.NDArray[np.intp]:
+    """The longest run, with those before and after it that its clock goes on from (a stretch between had another clock)."""
+    longest = max(range(len(runs)), key=lambda k: float(np.ptp(time[runs[k]])))
+    kept = [runs[longest]]
+    for run in runs[longest + 1 :]:
+        if 0 < time[run[0]] - time[kept[-1][-1]] < LEAP:
+            kept.append(run)
+    for run in reversed(runs[:longest]):
+        if 0 < time[kept[0][0]] - time[run[-1]] < LEAP:
+            kept.insert(0, run)
+    return np.concatenate(kept)
 
 
 def _astray(time: Array) -> npt.NDArray[np.bool_]:
@@ -106,6 +128,13 @@ def drop_codes(signal: Signal) -> tuple[Signal, list[str]]:
     share = float(outside.mean())
     if share == 0:
         return signal, []
+    absurd = np.abs(signal.values) > ABSURD * max(abs(entry.low), abs(entry.high))
+    if 0 < absurd.mean() < 0.01:
+        rest, said = drop_codes(_without(signal, absurd))
+        largest = float(np.nanmax(np.abs(signal.values[absurd])))
+        often = counted(int(absurd.sum()), "value")
+        told = f"{_named(signal)}: {often} of up to {largest:g} {entry.unit}, which no vehicle shows; taken as missing"
+        return rest, [told, *said]
     codes = np.unique(signal.values[outside])
     seldom = codes.size > 1 and int(outside.sum()) < 2 * codes.size
     if share >= 0.5 or codes.size > CODES_AT_MOST or seldom:
@@ -116,8 +145,12 @@ def drop_codes(signal: Signal) -> tuple[Signal, list[str]]:
         f"{_named(signal)}: {int(outside.sum())} of {len(signal)} values are {shown}{unit}, out of "
         f"{entry.low:g} to {entry.high:g}{unit}: the code for 'not valid'? They are taken as missing"
     )
-    cleaned = np.where(outside, np.nan, signal.values)
-    return Signal(signal.name, signal.time, cleaned, signal.unit, signal.source), [sentence]
+    return _without(signal, outside), [sentence]
+
+
+def _without(signal: Signal, where: npt.NDArray[np.bool_]) -> Signal:
+    """The signal with NaN in some places."""
+    return Signal(signal.name, signal.time, np.where(where, np.nan, signal.values), signal.unit, signal.source)
 
 
 def compare_clocks(signals: Sequence[Signal]) -> tuple[list[Signal], list[str]]:

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from codriver.errors import UsageError, VehicleError
 from codriver.names import nearest
 from codriver.observers.observer import Observer
 from codriver.observers.scaled_gain import Preset, check_tick
-from codriver.vehicles import Vehicle
+from codriver.vehicles import Vehicle, load_vehicle
 
 ESTIMATORS: dict[str, Estimator] = {}
 
@@ -111,7 +112,7 @@ def needed_signals(name: str, vehicle: Vehicle | None) -> tuple[str, ...]:
 
 def build(
     name: str,
-    vehicle: Vehicle | None = None,
+    vehicle: Vehicle | str | Path | None = None,
     *,
     dt: float = 0.01,
     ell: float | None = None,
@@ -122,7 +123,7 @@ def build(
 
     Args:
         name: one of ESTIMATORS.
-        vehicle: not needed by `kinematic`.
+        vehicle: loaded, or the name or path that `load_vehicle` takes; not needed by `kinematic`.
         dt: tick, s.
         ell: the knob; None takes the preset's (2 for 2017, 1.4 for 2015).
         preset: noise of a paper, or one's own; None takes the estimator's, which is "bisoffi2017" for all of the family
@@ -136,6 +137,8 @@ def build(
     """
     estimator = get_estimator(name)
     check_tick(dt)
+    if isinstance(vehicle, (str, Path)):
+        vehicle = load_vehicle(vehicle)
     if form not in ("kalman", "constant"):
         raise UsageError(f"form '{form}'", "'kalman' or 'constant'", "choose one")
     if estimator.parameters and vehicle is None:

@@ -17,7 +17,7 @@ from math import inf, isfinite, nan
 
 import numpy as np
 
-from codriver.errors import UsageError
+from codriver.errors import LogError, UsageError
 from codriver.names import VOCABULARY
 from codriver.signals.grid import Flags, Grid
 from codriver.signals.signal import Array, Signal
@@ -25,6 +25,9 @@ from codriver.signals.signal import Array, Signal
 # Stamps are written in microseconds at best, and as seconds since 1970 a double has a grain of 0.24 us; a value this
 # much after its tick belongs to it all the same.
 TOLERANCE = 2e-6
+
+# A day at 100 Hz. More is a clock gone wrong, and would fill the memory before anyone could say so.
+MOST_TICKS = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,8 @@ def sample(
         start, stop: first tick and bound of the last, s; by default the span of the channels that are there.
 
     Raises:
-        UsageError: dt is not positive, or the span holds more than 2^31 ticks.
+        UsageError: dt is not positive.
+        LogError: the span holds more than MOST_TICKS ticks.
     """
     chosen = list(channels)
     if not (dt > 0 and isfinite(dt)):
@@ -66,11 +70,11 @@ def sample(
     first = start if start is not None else min((float(t[0]) for t in stamps), default=0.0)
     last = stop if stop is not None else max((float(t[-1]) for t in stamps), default=first - dt)
     count = int(np.floor((last - first) / dt + TOLERANCE / dt)) + 1 if last >= first else 0
-    if count >= 2**31:
-        raise UsageError(
-            f"{count} ticks of {dt} s between {first} s and {last} s",
-            "at most 2^31 ticks",
-            "check the stamps of the log (mixed clocks?), or choose a longer tick",
+    if count > MOST_TICKS:
+        raise LogError(
+            f"{count} ticks of {dt:g} s between {first:.10g} s and {last:.10g} s",
+            f"at most {MOST_TICKS} ticks",
+            "check the stamps of the log (mixed clocks?), cut it with Log.between, or choose a longer tick",
         )
     time: Array = first + dt * np.arange(count, dtype=np.float64)
     values: dict[str, Array] = {}
