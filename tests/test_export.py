@@ -108,6 +108,27 @@ def test_export_is_whole_or_nothing(tmp_path, car):
     assert sorted(p.name for p in (tmp_path / "deep").iterdir()) == ["folder"]
 
 
+def test_export_as_a_whole_replaces_only_an_export(tmp_path, car):
+    kinematic, pedals = cd.compile(cd.build("kinematic")), cd.compile(cd.build("pedals-only", car))
+    folder = tmp_path / "firmware"
+    folder.mkdir()
+    (folder / "Makefile").write_text("mine")
+    for header in (None, "/* mine */"):
+        if header:
+            (folder / "kinematic.h").write_text(header)
+        with pytest.raises(UsageError, match="Makefile"):
+            export_c(kinematic, folder)
+        assert (folder / "Makefile").read_text() == "mine"
+    assert sorted(p.name for p in folder.iterdir()) == ["Makefile", "kinematic.h"]
+    own = tmp_path / "own"
+    export_c(kinematic, own)
+    (own / "main.c").write_text("mine")
+    export_c(kinematic, own, "float")
+    assert (own / "main.c").read_text() == "mine"
+    with pytest.raises(UsageError, match="not written by an export of this estimator"):
+        export_c(pedals, own)
+
+
 def _has_fma() -> bool:
     from llvmlite import binding
 

@@ -38,14 +38,15 @@ def export_c(program: Program, folder: str | Path, real: str = "double") -> list
 
     Args:
         program: compiled with the outputs wanted.
-        folder: is created; files of the same names in it are replaced.
+        folder: is created; the files of an earlier export of the same observer in it are replaced.
         real: "double" (bit-exact with codriver) or "float" (compared with a tolerance).
 
     Returns:
         the files written.
 
     Raises:
-        UsageError: `real` is neither, or the folder cannot be written.
+        UsageError: `real` is neither, the folder cannot be written, or it holds files of these names that are not such
+            an export.
     """
     if real not in ("double", "float"):
         raise UsageError(f"real = '{real}'", "'double' or 'float'", "choose one")
@@ -62,6 +63,7 @@ def export_c(program: Program, folder: str | Path, real: str = "double") -> list
         folder.parent.mkdir(parents=True, exist_ok=True)
         if folder.exists() and not folder.is_dir():
             raise NotADirectoryError(f"{folder} is a file")
+        _refuse_foreign(folder, list(files), f"{name}.h", _first_words(program))
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".codriver-") as scratch:
             for file, text in files.items():
                 (Path(scratch) / file).write_text(text, encoding="utf-8")
@@ -73,6 +75,29 @@ def export_c(program: Program, folder: str | Path, real: str = "double") -> list
             f"cannot write {folder}: {error}", "a folder that can be written", "choose another -o"
         ) from None
     return [folder / file for file in files]
+
+
+def _first_words(program: Program) -> str:
+    """What the header begins with."""
+    return f"/* {program.observer.name}:"
+
+
+def _refuse_foreign(folder: Path, files: Sequence[str], header: str, first: str) -> None:
+    """Files are replaced only where an earlier export of the same observer wrote them: its header tells.
+
+    Raises:
+        UsageError: they are somebody else's.
+    """
+    there = [file for file in files if (folder / file).exists()]
+    if not there:
+        return
+    mark = folder / header
+    if not mark.is_file() or not mark.read_bytes().startswith(first.encode()):
+        raise UsageError(
+            f"{folder} holds {', '.join(there)}, not written by an export of this estimator",
+            "a folder that is new, without files of these names, or an earlier export's",
+            "choose another -o",
+        )
 
 
 def _describe(channel: str) -> str:
@@ -101,7 +126,7 @@ def _header(program: Program, real: str) -> str:
                 inputs.append(("bool", flag.name, f"{note}; if false, the value is not looked at"))
     kept = [o for o in observer.outputs if o.name in recorded.outputs]
     lines = [
-        f"/* {observer.name}: {settings}", f" * One step every {observer.dt:g} s. SI units, axes of ISO 8855.", " */",
+        f"{_first_words(program)} {settings}", f" * One step every {observer.dt:g} s. SI units, axes of ISO 8855.", " */",
         f"#ifndef {guard}", f"#define {guard}", "", "#include <stdbool.h>", "", f"typedef {real} {name_type(name)};", "",
         "/* Carried from step to step; nothing else is remembered. */",
         *_struct("state", name, [(name_type(name), key, "") for key in recorded.carry] or [_NO_STATE]),
