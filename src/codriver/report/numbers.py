@@ -97,7 +97,7 @@ class Error:
         unit: display unit.
         rms, mean: of estimate less reference.
         lag: shift of the estimate that fits the reference best, s.
-        rms_shifted: RMS with that lag taken out.
+        rms_shifted: RMS after the best shift, by that lag.
         covered: share of the reference inside the 95% band; None without a band.
     """
 

@@ -102,8 +102,8 @@ def error_table(found: Sequence[Error], source: str) -> str:
         "against",
         "RMS error",
         "mean error",
-        "best lag",
-        "RMS error, lag taken out",
+        "best shift",
+        "RMS error, after the best shift",
         "inside the 95% band",
     )
     rows = [
@@ -115,8 +115,8 @@ def error_table(found: Sequence[Error], source: str) -> str:
     ]  # fmt: skip
     return (
         f"<p>Against the reference “{text(source or 'in memory')}” (dotted in the plots), over the valid ticks. The "
-        "lag is the shift that fits best; an observer always lags, so the error with the lag taken out says how well "
-        "the shape is met.</p>" + table(head, rows, (2, 3, 4, 5, 6))
+        "best shift in time is the one after which they differ least; an observer always lags, so the error after it "
+        "says how well the shape is met.</p>" + table(head, rows, (2, 3, 4, 5, 6))
     )  # fmt: skip
 
 
