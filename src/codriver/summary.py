@@ -9,9 +9,11 @@ import numpy as np
 
 from codriver.estimate import Estimate
 from codriver.signals.signal import Array
+from codriver.trust import Check
 
 SPEED = "longitudinal_speed"
 SHARES = ("braking", "both_pedals", "standstill")
+MOST_SPANS = 3  # named in a line of text; more are for the report
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,17 @@ def summarise(estimate: Estimate) -> Summary:
         shifts,
         {flag: float(estimate.flag(flag).mean()) if n else 0.0 for flag in SHARES if flag in estimate},
     )
+
+
+def tell_findings(check: Check) -> list[dict[str, str]]:
+    """Severity and text of each finding; with the times of the log that a fault is about, where these are few."""
+    told = []
+    for finding in check.findings:
+        where = ""
+        if finding.severity != "ok" and 0 < len(finding.spans) <= MOST_SPANS:
+            where = f" ({', '.join(f'{start:.1f}-{stop:.1f}' for start, stop in finding.spans)} s)"
+        told.append({"severity": finding.severity, "text": finding.text + where})
+    return told
 
 
 def _figures(estimate: Estimate, name: str, unit: str) -> Figures:

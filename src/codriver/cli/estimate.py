@@ -151,7 +151,7 @@ def _write(result: Estimate, out: Path, report: Path | None, command: str, truth
 
 def _told(result: Estimate, out: Path, report: Path | None, why: str) -> dict[str, object]:
     """What the terminal shows and --json prints."""
-    from codriver.summary import summarise
+    from codriver.summary import summarise, tell_findings
 
     check = result.check()
     return {
@@ -161,7 +161,7 @@ def _told(result: Estimate, out: Path, report: Path | None, why: str) -> dict[st
         "log": result.log.source,
         **summarise(result).to_dict(),
         "verdict": check.verdict,
-        "findings": [{"severity": f.severity, "text": f.text} for f in check.findings],
+        "findings": tell_findings(check),
         "result": str(out),
         "report": str(report) if report is not None else None,
     }
