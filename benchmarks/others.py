@@ -12,7 +12,7 @@ import numpy as np
 
 from codriver.models import intention_model
 from codriver.observers import ScaledGain
-from codriver.observers.jerk import WIDE_START
+from codriver.observers.jerk_forms import WIDE_START
 
 Work = Callable[[np.ndarray], np.ndarray]
 

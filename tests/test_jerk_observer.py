@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import codriver as cd
 from codriver.models import intention_model
 from codriver.observers import design_scaled_gain
-from codriver.observers.jerk import STATES, WIDE_START
+from codriver.observers.jerk_forms import STATES, WIDE_START
 from codriver.observers.noise_scale import PRIOR_SCALE
 from codriver.signals import Grid
 from conftest import constant, motion_log

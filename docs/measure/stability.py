@@ -13,7 +13,7 @@ import numpy as np
 from drives import table
 
 from codriver.observers import PRESETS, design_scaled_gain
-from codriver.observers.jerk import GAP, LARGEST_GAIN
+from codriver.observers.jerk_forms import GAP, LARGEST_GAIN
 from codriver.observers.scaled_gain import ScaledGain
 
 

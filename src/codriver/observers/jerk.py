@@ -22,24 +22,15 @@ Bisoffi et al. 2017, eq. (14)-(18).
 
 from __future__ import annotations
 
-import numpy as np
-
-from codriver.kernel import Scalar, both, either, minimum, negate, select, sqrt
-from codriver.models import intention_model
+from codriver.kernel import Scalar, both, negate, select, sqrt
 from codriver.observers import noise_scale
-from codriver.observers.covariance import Matrix, predict_covariance, update_row
+from codriver.observers.jerk_forms import ROWS, STATES, Situation, constant_update, initial, kalman_update
 from codriver.observers.observer import Observer, Output, Scalars
 from codriver.observers.response import delay
 from codriver.observers.scaled_gain import ScaledGain
 
-STATES = ("speed", "acceleration", "offset", "jerk")
 STANDSTILL_BELOW, STANDSTILL_ABOVE = 0.3, 0.5
 SLOW = 1.0
-WIDE_START = 25.0  # the covariance starts this many times the stationary one
-GAP = 0.5  # s without a row after which the constant form is not trusted
-LARGEST_GAIN = 0.77  # bound of n K_vv in the constant form
-SETTLED = 2.25  # valid while the jerk's variance is at most this many times the stationary one
-_PAIRS = [(i, j) for i in range(4) for j in range(i, 4)]
 
 
 def jerk_observer(design: ScaledGain, form: str, outputs: tuple[Output, ...], name: str = "jerk") -> Observer:
@@ -51,100 +42,53 @@ def jerk_observer(design: ScaledGain, form: str, outputs: tuple[Output, ...], na
         outputs: the four estimates, in the order of STATES, by the names they bear in the result.
         name: of the observer.
     """
-    kalman = form == "kalman"
-    P_stationary = design.P
-    C, rows = intention_model().C, ("acceleration", "speed")
-    # How long the constant form needs until its slowest error is down to 5 %.
-    settle = 3.0 / design.certificate.decay_rate
-    most = max(int(LARGEST_GAIN / float(design.K[0, 1])), 1)  # ticks that one innovation may stand for
-    wide = [[WIDE_START * float(P_stationary[i, j]) if i == j else 0.0 for j in range(4)] for i in range(4)]
+    update = kalman_update if form == "kalman" else constant_update
 
     def step(carry: Scalars, u: Scalars, y: Scalars, ok: Scalars, rho: Scalars) -> tuple[Scalars, Scalars]:
-        known, direction = u["known_input"], u["direction"]
+        """One tick: predict, update in the form's way, learn the noise scale, judge validity."""
+        y_a, y_v = _measurements(u, y, ok)
         ok_a, ok_v = ok["longitudinal_acceleration"], ok["longitudinal_speed"]
-        y_a = select(ok_a, y["longitudinal_acceleration"], 0.0)
-        raw_v = select(ok_v, y["longitudinal_speed"], 0.0)
-        backward = direction < 0
-        y_v = select(backward, -select(raw_v < 0, -raw_v, raw_v), raw_v)  # wheel speeds seldom carry a sign
-
         started, standing = _phase(carry, y_v, ok_v)
-        known = select(standing, 0.0, known)
-        x, P = _predict(carry, design, known, kalman)
+        known = select(standing, 0.0, u["known_input"])
         first = both(started, negate(carry["started"]))
-        x = [
-            select(first, value, old)
-            for value, old in zip([y_v, 0.0, select(ok_a, y_a - known, 0.0), 0.0], x, strict=True)
-        ]
-        if kalman:
-            P = [[select(first, wide[i][j], P[i][j]) for j in range(4)] for i in range(4)]
-
-        use_a, use_v = both(ok_a, started), both(ok_v, started)
-        predicted_a = x[1] + x[2] + known
-        if kalman:
-            e_a = select(use_a, y_a - predicted_a, 0.0)
-            x, P, s_a = update_row(x, P, C[0], e_a, design.Rd[0, 0], use_a)
-            e_v = select(use_v, y_v - x[0], 0.0)
-            x, P, s_v = update_row(x, P, C[1], e_v, design.Rd[1, 1], use_v)
-        else:
-            e_a, e_v = select(use_a, y_a - predicted_a, 0.0), select(use_v, y_v - x[0], 0.0)
-            times_a, times_v = (minimum(carry[f"ticks_{row}"] + 1.0, float(most)) for row in rows)
-            K = design.K
-            x = [x[i] + (float(K[i, 0]) * (times_a * e_a) + float(K[i, 1]) * (times_v * e_v)) for i in range(4)]
-            S = C @ design.P_predicted @ C.T + design.Rd
-            s_a, s_v = float(S[0, 0]), float(S[1, 1])
-        x = [x[0], select(standing, 0.0, x[1]), x[2], select(standing, 0.0, x[3])]
+        start = [y_v, 0.0, select(ok_a, y_a - known, 0.0), 0.0]
+        x = [select(first, new, old) for new, old in zip(start, _predict(carry, design, known), strict=True)]
         lost = both(negate(u["inputs_known"]), negate(standing))
-        if kalman:
-            P = _forget_motion(P, standing, np.diag(np.diag(P_stationary)).tolist())
-            P = _forget_motion(P, lost, wide)
-            memory = {f"P_{STATES[i]}_{STATES[j]}": P[i][j] for i, j in _PAIRS}
-            variances = [P[i][i] for i in range(4)]
-            settled = P[3][3] <= SETTLED * float(P_stationary[3, 3])
-        else:
-            memory = {
-                f"ticks_{row}": select(use, 0.0, carry[f"ticks_{row}"] + 1.0)
-                for row, use in zip(rows, (use_a, use_v), strict=True)
-            }
-            gap = either(*(memory[f"ticks_{row}"] > GAP / design.dt for row in rows))
-            memory["since_start"] = select(
-                either(negate(started), either(lost, gap)), 0.0, carry["since_start"] + design.dt
-            )
-            variances = [float(P_stationary[i, i]) for i in range(4)]
-            settled = memory["since_start"] >= settle
+        use_a, use_v = both(ok_a, started), both(ok_v, started)
+        now = Situation(known, y_a, y_v, use_a, use_v, started, first, standing, lost)
+        done = update(design, carry, x, now)
 
+        x = [done.x[0], select(standing, 0.0, done.x[1]), done.x[2], select(standing, 0.0, done.x[3])]
         moving = both(started, negate(standing))
-        innovations = {"acceleration": (e_a, s_a, use_a), "speed": (e_v, s_v, use_v)}
-        counts = both(moving, settled)
-        scale_new, scale = noise_scale.learn(carry, innovations, counts, design.dt, 1.0 / design.ell)
-        v_size = select(x[0] < 0, -x[0], x[0])
-        valid = both(both(moving, v_size >= SLOW), both(u["inputs_known"], settled))
+        counts = both(moving, done.settled)
+        scale_new, scale = noise_scale.learn(carry, done.innovations, counts, design.dt, 1.0 / design.ell)
+        quick = select(x[0] < 0, -x[0], x[0]) >= SLOW
+        valid = both(both(moving, quick), both(u["inputs_known"], done.settled))
         new = {
             "started": started, "standing": standing, "input_before": known,
-            **{f"x_{state}": value for state, value in zip(STATES, x, strict=True)}, **memory, **scale_new,
+            **{f"x_{state}": value for state, value in zip(STATES, x, strict=True)}, **done.memory, **scale_new,
         }  # fmt: skip
         out = {output.name: value for output, value in zip(outputs, x, strict=True)}
-        out |= {f"{o.name}_sd": sqrt(scale * variance) for o, variance in zip(outputs, variances, strict=True)}
-        out |= {
-            "acceleration_innovation": e_a, "acceleration_innovation_sd": sqrt(scale * s_a),
-            "speed_innovation": e_v, "speed_innovation_sd": sqrt(scale * s_v),
-            "acceleration_used": use_a, "speed_used": use_v, "standstill": standing, "valid": valid,
-        }  # fmt: skip
-        return new, out
+        out |= {f"{o.name}_sd": sqrt(scale * variance) for o, variance in zip(outputs, done.variances, strict=True)}
+        for row, (e, s, use) in done.innovations.items():
+            out |= {f"{row}_innovation": e, f"{row}_innovation_sd": sqrt(scale * s), f"{row}_used": use}
+        return new, {**out, "standstill": standing, "valid": valid}
 
-    carry = {"started": 0.0, "standing": 0.0, "input_before": 0.0}
-    carry |= {f"x_{state}": 0.0 for state in STATES}
-    if kalman:
-        carry |= {f"P_{STATES[i]}_{STATES[j]}": float(design.P[i, j]) for i, j in _PAIRS}
-    else:
-        carry |= {**{f"ticks_{row}": 0.0 for row in rows}, "since_start": 0.0}
-    carry |= noise_scale.initial()
+    carry = {"started": 0.0, "standing": 0.0, "input_before": 0.0, **{f"x_{state}": 0.0 for state in STATES}}
     return Observer(
-        name, design.dt, ("known_input", "direction", "inputs_known"),
-        ("longitudinal_acceleration", "longitudinal_speed"), carry, (*outputs, *_more_outputs(outputs, rows)), step,
+        name, design.dt, ("known_input", "direction", "inputs_known"), ("longitudinal_acceleration", "longitudinal_speed"),
+        {**carry, **initial(design, form), **noise_scale.initial()}, (*outputs, *_more_outputs(outputs, ROWS)), step,
         settings={"form": form, "ell": design.ell, "dt": design.dt, "delay_s": round(delay(design), 6)},
         gains={"L_K": design.L_K, "L": design.L, "K": design.K, "P": design.P, "Q_ell": design.Q, "R_ell": design.R},
         certificate=design.certificate,
     )  # fmt: skip
+
+
+def _measurements(u: Scalars, y: Scalars, ok: Scalars) -> tuple[Scalar, Scalar]:
+    """Accelerometer and signed speed, 0 where there is none: wheel speeds seldom carry a sign, the gear does."""
+    y_a = select(ok["longitudinal_acceleration"], y["longitudinal_acceleration"], 0.0)
+    raw = select(ok["longitudinal_speed"], y["longitudinal_speed"], 0.0)
+    return y_a, select(u["direction"] < 0, -select(raw < 0, -raw, raw), raw)
 
 
 def _phase(carry: Scalars, y_v: Scalar, ok_v: Scalar) -> tuple[Scalar, Scalar]:
@@ -155,27 +99,12 @@ def _phase(carry: Scalars, y_v: Scalar, ok_v: Scalar) -> tuple[Scalar, Scalar]:
     return started, select(ok_v, size < bound, carry["standing"])
 
 
-def _predict(carry: Scalars, design: ScaledGain, known: Scalar, kalman: bool) -> tuple[list[Scalar], Matrix]:
-    """State and covariance one tick on, before the measurements."""
+def _predict(carry: Scalars, design: ScaledGain, known: Scalar) -> list[Scalar]:
+    """The states one tick on, before the measurements."""
     x = [carry[f"x_{state}"] for state in STATES]
-    F, dt = design.F, design.dt
-    v = x[0] + dt * x[1] + float(F[0, 3]) * x[3] + (0.5 * dt) * (carry["input_before"] + known)
-    predicted = [v, x[1] + dt * x[3], x[2], x[3]]
-    if not kalman:
-        return predicted, []
-    P: Matrix = [[0.0] * 4 for _ in range(4)]
-    for i, j in _PAIRS:
-        P[i][j] = P[j][i] = carry[f"P_{STATES[i]}_{STATES[j]}"]
-    return predicted, predict_covariance(P, F, design.Qd)
-
-
-def _forget_motion(P: Matrix, when: Scalar, fresh: Matrix) -> Matrix:
-    """What is known of acceleration and jerk is forgotten: their entries are those of `fresh`, the others stay."""
-
-    def entry(i: int, j: int) -> Scalar:
-        return select(when, fresh[i][j], P[i][j]) if i in (1, 3) or j in (1, 3) else P[i][j]
-
-    return [[entry(i, j) for j in range(4)] for i in range(4)]
+    dt = design.dt
+    v = x[0] + dt * x[1] + float(design.F[0, 3]) * x[3] + (0.5 * dt) * (carry["input_before"] + known)
+    return [v, x[1] + dt * x[3], x[2], x[3]]
 
 
 def _more_outputs(outputs: tuple[Output, ...], rows: tuple[str, str]) -> tuple[Output, ...]:

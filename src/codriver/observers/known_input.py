@@ -68,6 +68,7 @@ def _front(
     M = vehicle.number("mass")
 
     def step(carry: Scalars, u: Scalars, y: Scalars, ok: Scalars, rho: Scalars) -> tuple[Scalars, Scalars]:
+        """One tick: follow the powertrain, subtract what the driver asks of it."""
         # The powertrain looks at optional signals too; those that this estimator does not take are never there.
         given, here = {**dict.fromkeys(_ALL, 0.0), **u}, {**dict.fromkeys(_ALL, 0.0), **ok}
         train = powertrain(vehicle, dt, carry, given, here)

@@ -138,6 +138,7 @@ class Observer:
         """
 
         def flat(carry: Scalars, given: Scalars) -> tuple[Scalars, Scalars]:
+            """The step on one mapping of inputs, as the recorder wants it."""
             ok = {f.name if f.name.endswith("_held") else f.channel: given[f.name] for f in self.flags}
             new, out = self.step(
                 carry,

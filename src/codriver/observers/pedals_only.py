@@ -26,6 +26,7 @@ def pedals_only(vehicle: Vehicle, dt: float) -> Observer:
     M, c_r, c_b = vehicle.number("mass"), vehicle.number("pedal_coefficient"), vehicle.number("brake_coefficient")
 
     def step(carry: Scalars, u: Scalars, y: Scalars, ok: Scalars, rho: Scalars) -> tuple[Scalars, Scalars]:
+        """One tick: follow the powertrain, differentiate the pedals."""
         train = powertrain(vehicle, dt, carry, u, ok)
         fine = both(ok["accelerator_pedal"], ok["brake_pressure"])
         pedal, pressure = (select(fine, u[n], 0.0) for n in ("accelerator_pedal", "brake_pressure"))
