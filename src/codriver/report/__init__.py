@@ -6,6 +6,7 @@
 * numbers: figures; words: explanations; tables: both as HTML
 * page: the whole; write: to a file
 * page.css, plots.js: how it looks, and what draws the plots
+* document: reports that are no estimate, as values; charts, document_page, document.js: how they are drawn and written
 """
 
 from codriver.report.write import write_report

@@ -24,6 +24,11 @@ from codriver.signals import Log
 from codriver.summary import summarise
 
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+HEAD = (
+    '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+    f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+    '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+)
 _FAR = 1e5  # s; times beyond (dates as seconds) are shown from the start of the drive
 _HINT = (
     "<p class=screen>Drag across a plot to zoom; all plots follow. Double click for the whole drive. "
@@ -55,11 +60,10 @@ def page(estimate: Estimate, title: str | None, truth: Log | None, command: str 
         f"<h2>Faults of the recording</h2>{tables.faults(estimate)}",
         f"<h2>How this was made</h2>{_provenance(estimate, command)}",
     ]
+    content = "\n".join(parts)
     return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{text(title)}</title>\n<style>\n{_asset('page.css')}</style>\n</head>\n<body>\n{chr(10).join(parts)}\n</body>\n</html>\n"
+        f"{HEAD}<title>{text(title)}</title>\n<style>\n{asset('page.css')}</style>\n</head>\n<body>\n"
+        f"{content}\n</body>\n</html>\n"
     )
 
 
@@ -102,8 +106,8 @@ def _plots(estimate: Estimate, truth: Log | None, origin: float) -> str:
         "<noscript><p>The plots need JavaScript; all figures in the tables stand without.</p></noscript></section>\n"
         f'<script type="application/json" id="figure">{spec}</script>\n'
         f'<script type="application/octet-stream" id="columns">{drawn.data}</script>\n'
-        f'<script type="application/octet-stream" id="plotly">{_plotly()}</script>\n'
-        f"<script>\n{_asset('plots.js')}</script>\n"
+        f'<script type="application/octet-stream" id="plotly">{plotly()}</script>\n'
+        f"<script>\n{asset('plots.js')}</script>\n"
     )
 
 
@@ -131,12 +135,13 @@ def _provenance(estimate: Estimate, command: str | None) -> str:
     return tables.table((), rows)
 
 
-def _asset(name: str) -> str:
+def asset(name: str) -> str:
+    """A file of this package, as text."""
     return files("codriver.report").joinpath(name).read_text(encoding="utf-8")
 
 
 @cache
-def _plotly() -> str:
+def plotly() -> str:
     """plotly's JavaScript, packed."""
     from plotly.offline import get_plotlyjs
 

@@ -35,8 +35,15 @@ def write_report(
     Raises:
         UsageError: the file cannot be written.
     """
-    target = Path(path)
-    content = page(estimate, title, truth, command)
+    write_whole(page(estimate, title, truth, command), Path(path))
+
+
+def write_whole(content: str, target: Path) -> None:
+    """Write text to a file that appears under its name only when it is complete.
+
+    Raises:
+        UsageError: the file cannot be written.
+    """
     temporary: Path | None = None
     try:
         handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
