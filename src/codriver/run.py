@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from codriver.errors import UsageError
 from codriver.estimate import Estimate
 from codriver.observers.feed import best, feeds, suggest_rate
@@ -58,7 +60,7 @@ def estimate_log(
     *,
     ell: float | None = None,
     rate: float | None = None,
-    preset: str | Preset | None = None,
+    preset: str | Path | Preset | None = None,
     form: str = "kalman",
 ) -> Estimate:
     """Estimate from a log.

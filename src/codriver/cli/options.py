@@ -34,7 +34,7 @@ PresetName = Annotated[
     str | None,
     typer.Option(
         "--preset",
-        help="Noise of a paper. Default: bisoffi2017, for intent-torque too, whose paper's own is --preset bisoffi2015.",
+        help="Noise of a paper, or a preset file (TOML). Default: bisoffi2017 (intent-torque's paper has bisoffi2015).",
         show_default=False,
     ),
 ]

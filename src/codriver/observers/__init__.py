@@ -3,6 +3,7 @@
 from codriver.observers import intent as _intent  # noqa: F401  registers its family
 from codriver.observers.feed import best, feeds
 from codriver.observers.observer import Certificate, Observer, Output, chain
+from codriver.observers.preset_file import find_preset, preset_of, save_preset
 from codriver.observers.registry import ESTIMATORS, Design, Estimator, build, families, register
 from codriver.observers.scaled_gain import PRESETS, Preset, ScaledGain, design_scaled_gain
 
@@ -22,5 +23,8 @@ __all__ = [
     "design_scaled_gain",
     "families",
     "feeds",
+    "find_preset",
+    "preset_of",
     "register",
+    "save_preset",
 ]

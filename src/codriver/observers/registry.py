@@ -17,6 +17,7 @@ from pathlib import Path
 from codriver.errors import UsageError, VehicleError
 from codriver.names import nearest
 from codriver.observers.observer import Observer
+from codriver.observers.preset_file import find_preset, preset_settings
 from codriver.observers.scaled_gain import Preset, check_tick
 from codriver.vehicles import Vehicle, load_vehicle
 
@@ -30,13 +31,13 @@ class Design:
     Attributes:
         dt: tick, s.
         ell: the knob; None takes the preset's.
-        preset: noise, by the name of a paper's or one's own; None where the estimator has none.
+        preset: noise, a paper's or one's own; None where the estimator has none.
         form: "kalman" or "constant", where the estimator has both.
     """
 
     dt: float = 0.01
     ell: float | None = None
-    preset: str | Preset | None = None
+    preset: Preset | None = None
     form: str = "kalman"
 
 
@@ -116,7 +117,7 @@ def build(
     *,
     dt: float = 0.01,
     ell: float | None = None,
-    preset: str | Preset | None = None,
+    preset: str | Path | Preset | None = None,
     form: str = "kalman",
 ) -> Observer:
     """Build an estimator.
@@ -126,8 +127,9 @@ def build(
         vehicle: loaded, or the name or path that `load_vehicle` takes; not needed by `kinematic`.
         dt: tick, s.
         ell: the knob; None takes the preset's (2 for 2017, 1.4 for 2015).
-        preset: noise of a paper, or one's own; None takes the estimator's, which is "bisoffi2017" for all of the family
-            intent. (`intent-torque` is of the 2015 paper, whose own noise is "bisoffi2015".)
+        preset: noise of a paper by its name, or one's own, as a value or the path of its file; None takes the estimator's,
+            which is "bisoffi2017" for all of the family intent. (`intent-torque` is of the 2015 paper, whose own noise is
+            "bisoffi2015".)
         form: "kalman" (missing and multi-rate rows exact) or "constant" (the papers' gain; small).
 
     Raises:
@@ -151,8 +153,9 @@ def build(
     if preset is not None and estimator.preset is None:
         raise UsageError(f"{name} has no noise to choose, but a preset was given", "none", "leave it (--preset) out")
     preset = estimator.preset if preset is None else preset
-    observer = estimator.build(vehicle, Design(dt, ell, preset, form))
+    noise = None if preset is None else find_preset(preset)
+    observer = estimator.build(vehicle, Design(dt, ell, noise, form))
     settings = {"estimator": name, **observer.settings}
-    if preset is not None:
-        settings["preset"] = preset if isinstance(preset, str) else "own"
+    if noise is not None:
+        settings |= preset_settings(noise)
     return replace(observer, name=name, settings=settings)

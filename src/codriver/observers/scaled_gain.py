@@ -36,17 +36,20 @@ DT_RANGE = (1e-6, 100.0)  # s
 
 @dataclass(frozen=True)
 class Preset:
-    """Noise of a paper: diagonals of Q (v, a_i, o_a, j_i) and R (accelerometer, speed), the knob it found best, and source."""
+    """Noise: diagonals of Q (v, a_i, o_a, j_i) and R (accelerometer, speed), the knob found best with it, source and name."""
 
     Q: tuple[float, float, float, float]
     R: tuple[float, float]
     ell: float
     source: str
+    name: str = "own"
 
 
 PRESETS: dict[str, Preset] = {
-    "bisoffi2017": Preset((1e-2, 1e-4, 1e-1, 1.0), (1.0, 1e-2), 2.0, "2017 eq. (21), ell from section IV-B"),
-    "bisoffi2015": Preset((1e-8, 1e-6, 1e-2, 1.0), (1.0, 1e-3), 1.4, "2015 eq. (20), ell from figure 3"),
+    "bisoffi2017": Preset(
+        (1e-2, 1e-4, 1e-1, 1.0), (1.0, 1e-2), 2.0, "2017 eq. (21), ell from section IV-B", "bisoffi2017"
+    ),
+    "bisoffi2015": Preset((1e-8, 1e-6, 1e-2, 1.0), (1.0, 1e-3), 1.4, "2015 eq. (20), ell from figure 3", "bisoffi2015"),
 }
 
 

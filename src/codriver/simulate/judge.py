@@ -20,6 +20,7 @@ from codriver.names import VOCABULARY
 from codriver.observers import build, design_scaled_gain
 from codriver.observers.intent import INTENTION
 from codriver.observers.jerk import jerk_observer
+from codriver.observers.preset_file import preset_of
 from codriver.program import compile
 from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
@@ -55,7 +56,7 @@ def judge(estimate: Estimate, truth: Log) -> list[Judgement]:
             longitudinal_acceleration (dv/dt), acceleration_offset and known_input.
     """
     settings = estimate.provenance
-    ell, dt, preset = float(settings["ell"]), estimate.grid.dt, settings["preset"]
+    ell, dt, preset = float(settings["ell"]), estimate.grid.dt, preset_of(settings)
     other = compile(build("kinematic", dt=dt, ell=ell, preset=preset, form=settings["form"])).run(
         estimate.log, start=float(estimate.time[0]), stop=float(estimate.time[-1])
     )
@@ -96,7 +97,7 @@ def delay_matched(estimate: Estimate, truth: Log, intention: str) -> Estimate:
     known = truth["longitudinal_acceleration"].values - truth[intention].values
     for name, values in (("known_input", known), ("direction", 1.0 + 0 * known), ("inputs_known", 1.0 + 0 * known)):
         signals.append(Signal(name, clock, values, ""))
-    design = design_scaled_gain(settings["preset"], estimate.grid.dt, float(settings["ell"]))
+    design = design_scaled_gain(preset_of(settings), estimate.grid.dt, float(settings["ell"]))
     program = compile(jerk_observer(design, settings["form"], INTENTION, "ideal"))
     grid = Log.of(signals, "ideal signals").sample(
         program.observer.channels, estimate.grid.dt, start=float(estimate.time[0]), stop=float(estimate.time[-1])
