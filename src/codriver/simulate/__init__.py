@@ -8,23 +8,50 @@ Its parameters are its own: an estimator never shares them, and may be wrong abo
     truth                   what was true, as a Log
     sensors                 what the sensors make of it
     can_layout, network, bus   frames of a CAN bus, and files of them
+    odometer                wheel speeds from teeth
     demo                    three minutes of all this
+    route, track            a road of 53 km with named stretches, and a closed track
+    road_test               42 minutes, and two laps, of all this
 """
 
+from codriver.simulate.bus import BusParameters, Hole, drop_outs
+from codriver.simulate.car_parameters import CAR_2015, PRINTED_2015, ROLLING_RADIUS_2015, CarParameters
 from codriver.simulate.demo import DemoDrive, DemoFiles, demo_drive, write_demo
 from codriver.simulate.drive import Trace, drive
-from codriver.simulate.sensors import SensorParameters, measured_log
+from codriver.simulate.road_test import ROAD_TEST_SENSORS, RoadTest, road_test, track_test
+from codriver.simulate.route import ROAD_TEST_STRETCHES, Stretch, road_test_road
+from codriver.simulate.sensors import PEDAL_NOISE_LEVELS, SensorParameters, measured_log
+from codriver.simulate.styles import STYLES, Style
+from codriver.simulate.track import track_road
 from codriver.simulate.truth import ideal_signals, truth_log
 
 __all__ = [
+    "CAR_2015",
+    "PEDAL_NOISE_LEVELS",
+    "PRINTED_2015",
+    "ROAD_TEST_SENSORS",
+    "ROAD_TEST_STRETCHES",
+    "ROLLING_RADIUS_2015",
+    "STYLES",
+    "BusParameters",
+    "CarParameters",
     "DemoDrive",
     "DemoFiles",
+    "Hole",
+    "RoadTest",
     "SensorParameters",
+    "Stretch",
+    "Style",
     "Trace",
     "demo_drive",
     "drive",
+    "drop_outs",
     "ideal_signals",
     "measured_log",
+    "road_test",
+    "road_test_road",
+    "track_road",
+    "track_test",
     "truth_log",
     "write_demo",
 ]

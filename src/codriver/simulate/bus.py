@@ -39,6 +39,34 @@ class BusParameters:
     holes: tuple[Hole, ...] = ()
 
 
+def drop_outs(
+    stop: float,
+    *,
+    seed: int = 1,
+    names: tuple[str, ...] = ("Wheels", "Dynamics", "EngineData", "PedalData", "Brakes", "Gearbox"),
+    every: float = 120.0,
+    shortest: float = 0.5,
+    longest: float = 3.0,
+) -> tuple[Hole, ...]:
+    """Holes at random, by start: one in `every` seconds on average, whatever the driver does then.
+
+    Args:
+        stop: end of the drive, s.
+        seed: of their places, lengths and messages.
+        names: the messages that suffer, in turn.
+        every: mean time between two holes, s.
+        shortest, longest: bounds of their lengths, s.
+    """
+    random = np.random.default_rng([seed, 31])
+    count = int(stop / every)
+    starts = np.sort(random.uniform(0.0, max(stop - longest, 0.0), count))
+    lengths = random.uniform(shortest, longest, count)
+    return tuple(
+        Hole(names[k % len(names)], float(start), float(length))
+        for k, (start, length) in enumerate(zip(starts, lengths, strict=True))
+    )
+
+
 def transmit(
     instruments: Instruments,
     stop: float,

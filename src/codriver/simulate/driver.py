@@ -54,6 +54,9 @@ class Driver:
         self.feet = Feet(style.foot, style.travel, HOLD if self._standing else 0.0)
         self._speeds = _own_speeds(style, road)
         self._ahead = np.arange(1.0, HORIZON + 1.0)
+        self._scenes = [p for p in road.scenes if p.at >= distance]
+        self._free: Array | None = None  # the speeds behind the scene in sight
+        self._free_at = 0.0
         guess = self._random.gauss
         self._mass = car.mass * (1 + 0.04 * guess(0, 1))
         self._brake, self._pedal = car.brake * (1 + 0.06 * guess(0, 1)), car.pedal * (1 + 0.06 * guess(0, 1))
@@ -98,6 +101,7 @@ class Driver:
 
     def _think(self, time: float, distance: float, v: float) -> None:
         style, plan = self.style, self.plan
+        self._look(time, distance)
         stop = self._stops[0].at - distance if self._stops else math.inf
         if v < 0.12 and plan.goal <= 0.0 and stop < 25.0:
             self._standing, self._leave = True, time + self._stops.pop(0).wait
@@ -118,6 +122,17 @@ class Driver:
             goal = max(-3.6, min(2.6, wish * scatter))
             duration = duration_of(goal - plan.goal, style.jerk)
             plan.burst(time, goal, duration * max(0.7, 1 + style.scatter * self._random.gauss(0, 1)))
+
+    def _look(self, time: float, distance: float) -> None:
+        """Lower the speeds wanted where a scene is in sight, and restore them when it is over."""
+        if self._free is not None and time >= self._free_at:
+            self._speeds, self._free = self._free, None
+        if self._free is None and self._scenes and distance >= self._scenes[0].at - self._scenes[0].seen:
+            scene = self._scenes.pop(0)
+            self._free, self._free_at = self._speeds, time + scene.lasts
+            self._speeds = self._free.copy()
+            around = slice(max(0, int(scene.at) - 10), int(scene.at) + 10)
+            self._speeds[around] = np.minimum(self._speeds[around], scene.speed)
 
     def _wanted(self, distance: float, v: float, stop: float) -> tuple[float, bool]:
         """The acceleration wanted (m/s^2), and whether it is the foreseen end of a manoeuvre."""

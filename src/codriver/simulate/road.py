@@ -1,6 +1,6 @@
-"""A road along its distance: slope, speed limits, curves, stops.
+"""A road along its distance: slope, speed limits, curves, stops, scenes.
 
-A road is written as a short list of zones, curves, slopes and stops, and looked up in tables of one entry a metre,
+A road is written as a short list of zones, curves, slopes, stops and scenes, and looked up in tables of one entry a metre,
 because the simulation asks for the slope at every step and the driver for the speeds of the next few hundred metres.
 
     alpha(s)   slope, rad, positive uphill; between two levels it changes as x^2 (3 - 2 x), whose rate is bounded
@@ -57,6 +57,20 @@ class Stop:
     wait: float
 
 
+@dataclass(frozen=True)
+class Scene:
+    """Something seen ahead that goes away again: another car at an intersection.
+
+    From `seen` metres before `at` (m) on, nobody wants to pass `at` faster than `speed` (m/s); `lasts` seconds later the
+    way is free.
+    """
+
+    at: float
+    speed: float
+    seen: float
+    lasts: float
+
+
 @dataclass(frozen=True, eq=False)
 class Road:
     """A road as tables of one entry a metre, index 0 at s = 0.
@@ -67,7 +81,7 @@ class Road:
         curvature: rho, 1/m, shape (n,).
         limit: signed speed, m/s, shape (n,).
         eager: shape (n,).
-        stops: by distance.
+        stops, scenes: by distance.
     """
 
     name: str
@@ -76,6 +90,7 @@ class Road:
     limit: Array
     eager: Array
     stops: tuple[Stop, ...]
+    scenes: tuple[Scene, ...] = ()
 
     @property
     def length(self) -> float:
@@ -101,6 +116,7 @@ def build_road(
     grades: list[Grade] | None = None,
     curves: list[Curve] | None = None,
     stops: list[Stop] | None = None,
+    scenes: list[Scene] | None = None,
     transition: float = 20.0,
 ) -> Road:
     """A road from its parts.
@@ -112,17 +128,19 @@ def build_road(
         grades: changes of slope, by distance; level before the first.
         curves: bends; straight between them.
         stops: lines to stop at.
+        scenes: what is seen for a while.
         transition: length over which a bend's curvature builds up and fades, m.
 
     Raises:
         UsageError: the zones do not start at 0, or a part lies beyond the road's end.
     """
-    grades, curves, stops = grades or [], curves or [], stops or []
+    grades, curves, stops, scenes = grades or [], curves or [], stops or [], scenes or []
     if not zones or zones[0].start != 0.0:
         raise UsageError(
             "the first speed zone does not start at 0 m", "zones that cover the road", "start the first zone at 0"
         )
-    last = max([z.start for z in zones] + [g.start for g in grades] + [c.stop for c in curves] + [p.at for p in stops])
+    ends = [z.start for z in zones] + [g.start for g in grades] + [c.stop for c in curves]
+    last = max(ends + [p.at for p in stops] + [p.at for p in scenes])
     if last > length:
         raise UsageError(f"a part of the road lies at {last:g} m", f"all within its {length:g} m", "lengthen the road")
     s = np.arange(math.ceil(length) + 1, dtype=float)
@@ -146,6 +164,7 @@ def build_road(
         np.array([z.speed for z in zones])[zone],
         np.array([z.eager for z in zones])[zone],
         tuple(sorted(stops, key=lambda p: p.at)),
+        tuple(sorted(scenes, key=lambda p: p.at)),
     )
 
 

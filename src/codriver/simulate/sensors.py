@@ -6,7 +6,8 @@ Accelerometer, on a body that pitches, on a driveline that rings:
     theta = G(s) k v',               G = w_p^2 / (s^2 + 2 z_p w_p s + w_p^2)   nose up when speeding up
     ring  = share (H(s) - 1) tau T_c / M,   H likewise with w_d, z_d            decaying after each shift and tip-in
 
-Wheel speeds show nothing below their least speed (the teeth pass too slowly), and differ in bends and by noise.
+Wheel speeds show nothing below their least speed (the teeth pass too slowly), and differ in bends and by noise. With
+`teeth` they are made of the edges of a toothed ring, with the errors of such a measurement (`odometer.py`).
 Pedals, pressure and torque have noise and the steps of their converters. The gearbox's own states are exact.
 Noise is white per sample; its standard deviation does not depend on the rate.
 """
@@ -23,6 +24,7 @@ from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
 from codriver.simulate.car import GRAVITY
 from codriver.simulate.drive import Trace
+from codriver.simulate.odometer import edge_times, tooth_speed
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,10 @@ class SensorParameters:
         ring_frequency, ring_damping: Hz and 1.
         speed_noise, speed_step: of a wheel, m/s.
         speed_least: below it a wheel shows 0, m/s.
+        teeth: of a wheel's ring; 0 for a wheel speed without teeth, true but for its noise.
+        rolling_radius: of the wheels, m; for the teeth.
+        tooth_error: standard deviation of a tooth's place, share of the distance between two.
+        timer_step: of the timer that stamps the teeth, s.
         pedal_noise, pedal_step: share of the pedal's range.
         brake_noise, brake_step: Pa.
         brake_zero: offset of the pressure sensor, Pa.
@@ -60,6 +66,10 @@ class SensorParameters:
     speed_noise: float = 0.012
     speed_step: float = 0.01
     speed_least: float = 0.3
+    teeth: int = 0
+    rolling_radius: float = 0.31
+    tooth_error: float = 0.004
+    timer_step: float = 4e-6
     pedal_noise: float = 0.001
     pedal_step: float = 0.004
     brake_noise: float = 0.05e5
@@ -71,6 +81,10 @@ class SensorParameters:
     track: float = 1.5
     clutch: Literal["torque", "travel"] = "torque"
 
+
+# For judging estimators: standard deviations of pedal (share of its range) and brake pressure (Pa), from good sensors to
+# bad ones. Use: SensorParameters(pedal_noise=pedal, brake_noise=brake).
+PEDAL_NOISE_LEVELS = ((0.001, 0.05e5), (0.005, 0.15e5), (0.01, 0.3e5), (0.02, 0.6e5))
 
 WHEELS = {"front_left": (1, 1), "front_right": (1, -1), "rear_left": (0, 1), "rear_right": (0, -1)}
 
@@ -106,7 +120,7 @@ class Instruments:
     """
 
     def __init__(self, trace: Trace, sensors: SensorParameters, seed: int) -> None:
-        self._trace, self._p = trace, sensors
+        self._trace, self._p, self._seed = trace, sensors, seed
         self._random = np.random.default_rng([seed, 17])
         self._curves: dict[str, Array] = {}
 
@@ -117,7 +131,10 @@ class Instruments:
             # States are held, not interpolated.
             index = np.clip(np.searchsorted(trace["time"], times, side="right") - 1, 0, len(trace) - 1)
             return self._curve(name)[index]
-        clean = np.interp(times, trace["time"], self._curve(name))
+        if name.startswith("wheel.") and p.teeth:
+            clean = self._by_teeth(name, times)
+        else:
+            clean = np.interp(times, trace["time"], self._curve(name))
         sd, step = {
             "longitudinal_acceleration": (p.acceleration_noise, p.acceleration_step),
             "lateral_acceleration": (p.acceleration_noise, p.acceleration_step),
@@ -139,6 +156,15 @@ class Instruments:
         elif name in ("engine_torque", "engine_speed"):
             noisy = np.where(clean == 0.0, 0.0, noisy)
         return np.round(noisy / step) * step
+
+    def _by_teeth(self, name: str, times: Array) -> Array:
+        """A wheel's speed (m/s) as the brake unit works it out of the teeth, at the ends of its periods `times`."""
+        p = self._p
+        ring = np.random.default_rng([self._seed, 23, list(WHEELS).index(name.removeprefix("wheel."))])
+        shares = p.tooth_error * ring.standard_normal(p.teeth)
+        pitch = 2 * np.pi * p.rolling_radius / p.teeth
+        edges = edge_times(self._trace["time"], self._curve(name), pitch, shares, p.timer_step)
+        return tooth_speed(edges, times, pitch, p.speed_least)
 
     def _curve(self, name: str) -> Array:
         """A sensor's signal before noise and sampling, on the trace's clock; worked out once."""

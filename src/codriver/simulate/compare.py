@@ -1,0 +1,149 @@
+"""Estimators of the intention side by side on one simulated drive, with all that speaks for and against each.
+
+Root mean square errors of the jerk, each beside that of always answering zero:
+
+    moment   against the truth of the moment; a lag counts as error
+    matched  against the same observer fed ideal signals of the truth (`judge.delay_matched`); the lag is taken out
+    shifts   `matched`, in gear shifts and the second after each, in which the observer still answers to it
+
+and the best correlation with the truth over lags from 0 to 2 s, with the lag where it is reached. Each against two truths:
+the intention as the model defines it ("model"), and the driver's plan ("plan"), which knows nothing of gears and pedals. All
+estimators are judged on the same ticks: those where every one of them is valid.
+
+`pedals-only` has no observer, so nothing is there to match; it is judged by moment and correlation alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from codriver.estimate import Estimate
+from codriver.observers import build
+from codriver.program import compile
+from codriver.signals import Log
+from codriver.signals.grid import Flags
+from codriver.signals.signal import Array
+from codriver.simulate.judge import at, delay_matched
+from codriver.vehicles import Vehicle
+
+Truth = Literal["model", "plan"]
+TRUTHS: Mapping[Truth, tuple[str, str]] = {
+    "model": ("intentional_acceleration", "intentional_jerk"),
+    "plan": ("planned_acceleration", "planned_jerk"),
+}
+AFTER = 1.0  # a shift counts from its start to this many seconds after its end
+LONGEST_LAG, LAG_STEP = 2.0, 0.02  # s
+KNOBLESS = "pedals-only"
+
+
+@dataclass(frozen=True)
+class Score:
+    """One estimator at one ell against one truth; errors in m/s^3, rms.
+
+    Attributes:
+        estimator, ell, truth: what was judged against what; ell None where there is no knob.
+        moment, zero: error against the truth of the moment, and that of answering zero.
+        correlation, lag: the best correlation with the truth, and the lag where it is reached, s.
+        matched, matched_zero: with the lag taken out, and that of answering zero; None without an observer.
+        shifts, shifts_zero: the same in gear shifts.
+    """
+
+    estimator: str
+    ell: float | None
+    truth: Truth
+    moment: float
+    zero: float
+    correlation: float
+    lag: float
+    matched: float | None = None
+    matched_zero: float | None = None
+    shifts: float | None = None
+    shifts_zero: float | None = None
+
+
+def run_estimators(
+    log: Log,
+    vehicle: Vehicle,
+    names: Sequence[str],
+    ells: Sequence[float],
+    *,
+    dt: float = 0.01,
+    preset: str | None = None,
+) -> dict[tuple[str, float | None], Estimate]:
+    """Estimates of several estimators at several ell, all on the same ticks; by (name, ell).
+
+    Args:
+        log: the drive.
+        vehicle: for those that need one.
+        names: of estimators; `pedals-only` is run once, with ell None.
+        ells: the knob.
+        dt: tick, s.
+        preset: noise; None takes each estimator's own.
+    """
+    main = ("longitudinal_acceleration", "longitudinal_speed")
+    start = min(float(log[name].time[0]) for name in main)
+    stop = min(float(log[name].time[-1]) for name in main)
+    made = {}
+    for name in names:
+        for ell in (None,) if name == KNOBLESS else ells:
+            observer = build(name, vehicle, dt=dt, ell=ell, preset=None if name == KNOBLESS else preset)
+            made[name, ell] = compile(observer).run(log, start=start, stop=stop)
+    return made
+
+
+def compare(estimates: Mapping[tuple[str, float | None], Estimate], truth: Log) -> list[Score]:
+    """Judge estimates of `run_estimators` against a truth (`truth_log`)."""
+    first = next(iter(estimates.values()))
+    use = np.logical_and.reduce([estimate.valid for estimate in estimates.values()])
+    in_shift = use & shifting(truth, first.time)
+    scores = []
+    for of, (acceleration, jerk) in TRUTHS.items():
+        moment = at(truth, jerk, first.time)
+        for (name, ell), estimate in estimates.items():
+            ours = jerk_of(estimate)
+            correlation, lag = best_lag(ours, moment, use, first.grid.dt)
+            score = Score(name, ell, of, rms((ours - moment)[use]), rms(moment[use]), correlation, lag)
+            if name != KNOBLESS:
+                wanted = delay_matched(estimate, truth, acceleration).columns["intentional_jerk"]
+                score = Score(
+                    name, ell, of, score.moment, score.zero, correlation, lag,
+                    rms((ours - wanted)[use]), rms(wanted[use]), rms((ours - wanted)[in_shift]), rms(wanted[in_shift]),
+                )  # fmt: skip
+            scores.append(score)
+    return scores
+
+
+def jerk_of(estimate: Estimate) -> Array:
+    """The jerk an estimate gives, be it the driver's or the vehicle's; m/s^3, shape (n,)."""
+    name = "intentional_jerk" if "intentional_jerk" in estimate else "longitudinal_jerk"
+    return estimate.columns[name]
+
+
+def shifting(truth: Log, time: Array) -> Flags:
+    """Where a gear shift goes on or was over less than AFTER seconds ago; at times (s, shape (n,))."""
+    active = truth["shift"].time[truth["shift"].values != 0]
+    if not active.size:
+        return np.zeros(time.size, bool)
+    newest = np.searchsorted(active, time, side="right") - 1
+    return np.asarray((newest >= 0) & (time - active[np.maximum(newest, 0)] < AFTER))
+
+
+def best_lag(estimate: Array, truth: Array, use: Flags, dt: float) -> tuple[float, float]:
+    """The best correlation of an estimate with an earlier truth over the lags, and the lag, s; over the ticks of `use`."""
+    best = (-1.0, 0.0)
+    step = max(1, round(LAG_STEP / dt))
+    for lag in range(0, min(round(LONGEST_LAG / dt), truth.size - 2) + 1, step):
+        chosen = use[lag:]
+        x, y = estimate[lag:][chosen], truth[: truth.size - lag][chosen]
+        if x.size > 2 and x.std() > 0 and y.std() > 0:
+            best = max(best, (float(np.corrcoef(x, y)[0, 1]), lag * dt))
+    return best
+
+
+def rms(x: Array) -> float:
+    """Root mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(x**2))) if x.size else float("nan")
