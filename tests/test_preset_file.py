@@ -45,7 +45,7 @@ def test_wrong_files(change, said):
 
 
 def test_unknown_preset():
-    with pytest.raises(UsageError, match="did you mean .bisoffi2017"):
+    with pytest.raises(UsageError, match=r"did you mean .bisoffi2017"):
         find_preset("bisofi2017")
     with pytest.raises(UsageError, match="cannot read"):
         find_preset("not_there.toml")
