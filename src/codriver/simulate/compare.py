@@ -103,12 +103,15 @@ def compare(estimates: Mapping[tuple[str, float | None], Estimate], truth: Log) 
     scores = []
     for of, (acceleration, jerk) in TRUTHS.items():
         moment = at(truth, jerk, first.time)
+        matched: dict[float | None, Array] = {}  # the observers of one ell have the same reference
         for (name, ell), estimate in estimates.items():
             ours = jerk_of(estimate)
             correlation, lag = best_lag(ours, moment, use, first.grid.dt)
             score = Score(name, ell, of, rms((ours - moment)[use]), rms(moment[use]), correlation, lag)
             if name != KNOBLESS:
-                wanted = delay_matched(estimate, truth, acceleration).columns["intentional_jerk"]
+                if ell not in matched:
+                    matched[ell] = delay_matched(estimate, truth, acceleration).columns["intentional_jerk"]
+                wanted = matched[ell]
                 score = Score(
                     name, ell, of, score.moment, score.zero, correlation, lag,
                     rms((ours - wanted)[use]), rms(wanted[use]), rms((ours - wanted)[in_shift]), rms(wanted[in_shift]),
