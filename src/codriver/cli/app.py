@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from codriver import __version__
-from codriver.cli import check, demo, estimate, export, info
+from codriver.cli import check, demo, estimate, export, info, smooth
 from codriver.errors import CodriverError
 
 app = typer.Typer(
@@ -29,6 +29,7 @@ app = typer.Typer(
 app.command("demo")(demo.demo)
 app.command("info")(info.info)
 app.command("estimate")(estimate.estimate)
+app.command("smooth")(smooth.smooth)
 app.add_typer(check.app, name="check")
 app.add_typer(export.app, name="export")
 

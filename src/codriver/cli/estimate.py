@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_module
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -56,8 +57,9 @@ def estimate_file(
     report: Path | None = None,
     as_json: bool = False,
     truth: Log | None = None,
+    work: Callable[..., Estimate] | None = None,
 ) -> Estimate:
-    """What the command does; the demo calls it too, with the truth for its report."""
+    """What the command does; the demo calls it too, with the truth for its report, and `smooth`, with its own `work`."""
     from codriver.cli.options import check_inputs
     from codriver.cli.terminal import command_line, say, working
     from codriver.logs import read
@@ -73,7 +75,8 @@ def estimate_file(
         recorded = read(path, dbc=dbc, names=names, bus=bus)
         name, why = choose(estimator, recorded, vehicle)
         stage(f"estimating: {name}")
-        result = estimate_log(name, recorded, vehicle, ell=ell, rate=rate, preset=preset, form=form)
+        run = work or estimate_log
+        result = run(name, recorded, vehicle, ell=ell, rate=rate, preset=preset, form=form)
         _refuse_empty(result)
         stage(f"writing {out.name}" + (f" and {report.name}" if report is not None else ""))
         _write(result, out, report, command_line(), truth)

@@ -49,7 +49,7 @@ def say(summary: dict[str, Any]) -> None:
 
     out = console()
     settings = summary["settings"]
-    parts = [f"{key} {settings[key]}" for key in ("vehicle", "ell", "preset", "form") if key in settings]
+    parts = [f"{key} {settings[key]}" for key in ("vehicle", "ell", "preset", "form", "smoother") if key in settings]
     out.print(
         f"[bold]{summary['estimator']}[/] on {escape(summary['log'])}" + (f": {', '.join(parts)}" if parts else "")
     )
