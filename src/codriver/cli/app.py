@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from codriver import __version__
-from codriver.cli import check, demo, estimate, export, info, smooth
+from codriver.cli import check, demo, estimate, export, info, simulate, smooth
 from codriver.errors import CodriverError
 
 app = typer.Typer(
@@ -32,6 +32,7 @@ app.command("estimate")(estimate.estimate)
 app.command("smooth")(smooth.smooth)
 app.add_typer(check.app, name="check")
 app.add_typer(export.app, name="export")
+app.add_typer(simulate.app, name="simulate")
 
 
 def _version(wanted: bool) -> None:

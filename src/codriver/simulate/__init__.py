@@ -12,12 +12,15 @@ Its parameters are its own: an estimator never shares them, and may be wrong abo
     demo                    three minutes of all this
     route, track            a road of 53 km with named stretches, and a closed track
     road_test               42 minutes, and two laps, of all this
+    folder, drive_files     files, written whole or not at all
 """
 
 from codriver.simulate.bus import BusParameters, Hole, drop_outs
 from codriver.simulate.car_parameters import CAR_2015, PRINTED_2015, ROLLING_RADIUS_2015, CarParameters
 from codriver.simulate.demo import DemoDrive, DemoFiles, demo_drive, write_demo
 from codriver.simulate.drive import Trace, drive
+from codriver.simulate.drive_files import DriveFiles, nominal_2015, write_drive
+from codriver.simulate.folder import refuse_foreign
 from codriver.simulate.road_test import ROAD_TEST_SENSORS, RoadTest, road_test, track_test
 from codriver.simulate.route import ROAD_TEST_STRETCHES, Stretch, road_test_road
 from codriver.simulate.sensors import PEDAL_NOISE_LEVELS, SensorParameters, measured_log
@@ -37,6 +40,7 @@ __all__ = [
     "CarParameters",
     "DemoDrive",
     "DemoFiles",
+    "DriveFiles",
     "Hole",
     "RoadTest",
     "SensorParameters",
@@ -48,10 +52,13 @@ __all__ = [
     "drop_outs",
     "ideal_signals",
     "measured_log",
+    "nominal_2015",
+    "refuse_foreign",
     "road_test",
     "road_test_road",
     "track_road",
     "track_test",
     "truth_log",
     "write_demo",
+    "write_drive",
 ]

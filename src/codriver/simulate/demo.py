@@ -7,20 +7,18 @@ drive.
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from codriver.errors import LogError, UsageError
 from codriver.logs.frames import Frames
 from codriver.signals import Log
 from codriver.simulate.bus import BusParameters, Hole, transmit, write_trace
 from codriver.simulate.can_layout import dbc_text
 from codriver.simulate.car import GRAVITY
 from codriver.simulate.drive import Trace, drive
+from codriver.simulate.folder import refuse_foreign, write_whole
 from codriver.simulate.network import MESSAGES, names_text
 from codriver.simulate.road import demo_road
 from codriver.simulate.sensors import Instruments, SensorParameters, measured_log
@@ -28,7 +26,6 @@ from codriver.simulate.truth import truth_log
 
 DURATION = 180.0  # s
 HOLE = Hole("Wheels", 41.0, 1.2)
-_OWN = ("car.dbc", "drive.blf", "truth.parquet")  # a folder with these is a demo
 # The logger's columns: name, signal, factor to its unit, decimals. It counts braking as positive.
 _LOGGER = (
     ("VehSpd", "longitudinal_speed", 3.6, 2),
@@ -86,49 +83,16 @@ def write_demo(folder: str | Path, seed: int = 1) -> DemoFiles:
         LogError: a file cannot be written.
     """
     folder = Path(folder)
-    _refuse_foreign(folder)
+    refuse_foreign(folder, "demo")
     demo = demo_drive(seed)
-    files = _files(folder)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".codriver-") as scratch:
-            drafts = _files(Path(scratch))
-            _write(demo, drafts, seed)
-            folder.mkdir(exist_ok=True)
-            for field in fields(DemoFiles):
-                shutil.move(str(getattr(drafts, field.name)), getattr(files, field.name))
-    except (OSError, LogError) as error:
-        # A LogError names the temporary folder; its cause is the system's.
-        cause = error if isinstance(error, OSError) else error.__cause__
-        said = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause or error)
-        raise LogError(
-            f"cannot write the demo into {folder}: {said}",
-            "room on the disk and the right to write",
-            "remove the cause, or choose another --out",
-        ) from error
-    return files
+    write_whole(folder, lambda scratch: _write(demo, _files(scratch), seed), "demo")
+    return _files(folder)
 
 
 def _files(folder: Path) -> DemoFiles:
     """The files of a demo in a folder."""
     names = ("drive.blf", "car.dbc", "names.toml", "truth.parquet", "logger.csv")
     return DemoFiles(*(folder / name for name in names))
-
-
-def _refuse_foreign(folder: Path) -> None:
-    """A demo replaces files only where an earlier one wrote them.
-
-    Raises:
-        UsageError: the folder is a file, or holds files and no demo.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise UsageError(f"--out {folder} is a file", "a folder, or a name that is free", "choose another --out")
-    if folder.is_dir() and any(folder.iterdir()) and not all((folder / name).is_file() for name in _OWN):
-        raise UsageError(
-            f"--out {folder} holds files that are no demo",
-            "a folder that is new, empty or an earlier demo's",
-            "choose another --out",
-        )
 
 
 def _write(demo: DemoDrive, files: DemoFiles, seed: int) -> None:

@@ -188,7 +188,7 @@ def _style(style: str | Style) -> Style:
         return STYLES[style]
     near = nearest(style, STYLES)
     raise UsageError(
-        f"no driver '{style}'" + (f"; {near}?" if near else ""),
+        f"no driver '{style}'" + (f" (did you mean {near}?)" if near else ""),
         f"one of {', '.join(STYLES)}",
         "choose one of them",
     )

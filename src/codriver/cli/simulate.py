@@ -1,0 +1,77 @@
+"""codriver simulate: long drives with known truth, as the files a logger would have left."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from codriver.simulate import RoadTest
+    from codriver.vehicles import Vehicle
+
+app = typer.Typer(help="Simulate a long drive with known truth.", no_args_is_help=True, rich_markup_mode=None)
+
+Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.", show_default=False)]
+Driver = Annotated[str, typer.Option("--driver", help="aggressive, anticipating, ordinary, nervous, smooth or brisk.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Another seed, another drive of the same kind.")]
+Duration = Annotated[
+    float | None,
+    typer.Option("--duration", help="End after so many seconds. Default: the whole way.", show_default=False),
+]
+
+
+@app.command("road-test")
+def road_test(out: Out, driver: Driver = "ordinary", seed: Seed = 1, duration: Duration = None) -> None:
+    """Drive 53 km of town, country and motorway, some 42 minutes, with the car of the 2017 paper.
+
+    Example: codriver simulate road-test -o drive --driver smooth
+    """
+    from codriver.simulate import road_test
+
+    _simulate(out, lambda: road_test(driver, seed, duration=duration), "bisoffi2017", None)
+
+
+@app.command("track")
+def track(out: Out, driver: Driver = "ordinary", seed: Seed = 1, duration: Duration = None) -> None:
+    """Drive two laps of a handling track with the car of the 2015 paper; writes its nominal vehicle.toml too.
+
+    Example: codriver simulate track -o laps
+    """
+    from codriver.simulate import nominal_2015, track_test
+
+    _simulate(out, lambda: track_test(driver, seed, duration=duration), str(out / "vehicle.toml"), nominal_2015())
+
+
+def _simulate(out: Path, drive: Callable[[], RoadTest], vehicle: str, nominal: Vehicle | None) -> None:
+    """Simulate, write, and say what was written and how to estimate from it."""
+    import shlex
+
+    from codriver.cli.terminal import console, working
+    from codriver.simulate import refuse_foreign, write_drive
+
+    refuse_foreign(out, "simulated drive")
+    with working(True, 2) as stage:
+        stage("driving")
+        test = drive()
+        stage("writing the CAN trace")
+        files = write_drive(out, test, vehicle=nominal)
+    trace = test.trace
+    estimator = "intent-pedals" if nominal is None else "intent-torque"
+    command = [
+        "codriver", "estimate", estimator, str(files.log), "--dbc", str(files.dbc), "--names", str(files.names),
+        "--vehicle", vehicle, "-o", str(out / "estimate.parquet"), "--report", str(out / "report.html"),
+    ]  # fmt: skip
+    minutes = float(trace["time"][-1]) / 60
+    written = [files.log, files.dbc, files.names, files.truth, *([files.vehicle] if files.vehicle else [])]
+    console().print(
+        f"{trace.road.name}\n"
+        f"{trace.style.name} driver, seed {test.seed}: {trace['distance'][-1] / 1000:.2f} km in {minutes:.1f} minutes, "
+        f"{len(test.frames)} CAN frames, holes in them: {len(test.bus.holes)}\n"
+        f"wrote {', '.join(str(path) for path in written)}\n\n"
+        f"estimate from it: {shlex.join(command)}",
+        markup=False,
+    )
