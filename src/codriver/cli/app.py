@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from codriver import __version__
-from codriver.cli import check, demo, estimate, export, info, simulate, smooth
+from codriver.cli import check, demo, estimate, export, identify, info, simulate, smooth
 from codriver.errors import CodriverError
 
 app = typer.Typer(
@@ -31,6 +31,7 @@ app.command("info")(info.info)
 app.command("estimate")(estimate.estimate)
 app.command("smooth")(smooth.smooth)
 app.add_typer(check.app, name="check")
+app.add_typer(identify.app, name="identify")
 app.add_typer(export.app, name="export")
 app.add_typer(simulate.app, name="simulate")
 

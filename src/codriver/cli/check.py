@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from codriver.cli.options import Bus, Dbc, Names
+
+if TYPE_CHECKING:
+    from codriver.vehicles import Vehicle
 
 app = typer.Typer(help="Check a vehicle file or a names file.", no_args_is_help=True, rich_markup_mode=None)
 File = Annotated[
@@ -14,8 +19,17 @@ File = Annotated[
 
 
 @app.command("vehicle")
-def vehicle(file: File) -> None:
-    """Check a vehicle file; show its parameters and which estimators it serves."""
+def vehicle(
+    file: File,
+    log: Annotated[
+        Path | None,
+        typer.Option("--log", help="A recording of this vehicle: do its signals agree with the parameters?", show_default=False),
+    ] = None,
+    dbc: Dbc = None,
+    names: Names = None,
+    bus: Bus = None,
+) -> None:  # fmt: skip
+    """Check a vehicle file; show its parameters and which estimators it serves; with --log, hold it against a drive."""
     from rich.markup import escape
     from rich.table import Table
 
@@ -40,6 +54,26 @@ def vehicle(file: File) -> None:
             f"  {'[red]no[/] ' if lacking else '[green]yes[/]'} {estimator.name:<14}"
             + (f" lacks {', '.join(lacking)}" if lacking else "")
         )
+    if log is not None:
+        _against(car, log, dbc, names, bus)
+
+
+def _against(car: Vehicle, log: Path, dbc: Path | None, names: Path | None, bus: int | None) -> None:
+    """Say how the vehicle fits a drive; exit code 1 if it does not."""
+    from codriver.cli.options import check_inputs
+    from codriver.cli.terminal import console, say_findings
+    from codriver.identify import check_vehicle_against_log
+    from codriver.logs import read
+
+    check_inputs(log, dbc, names)
+    findings = check_vehicle_against_log(read(log, dbc=dbc, names=names, bus=bus), car)
+    out = console()
+    out.print(f"\n[bold]held against[/] {log}", soft_wrap=True)
+    if not findings:
+        out.print("  nothing can be judged: the log lacks the signals, or moves too little")
+    say_findings(out, ({"severity": f.severity, "text": f.text} for f in findings))
+    if any(f.severity == "bad" for f in findings):
+        raise typer.Exit(1)
 
 
 @app.command("names")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +42,14 @@ def console() -> Console:
     return Console(highlight=False, soft_wrap=piped, width=160 if piped else None)
 
 
+def say_findings(out: Console, findings: Iterable[Mapping[str, str]]) -> None:
+    """Show findings: severity and text each, a line each."""
+    from rich.markup import escape
+
+    for finding in findings:
+        out.print(f"  [{_STYLE[finding['severity']]}]{finding['severity']:<4}[/] {escape(finding['text'])}")
+
+
 def say(summary: dict[str, Any]) -> None:
     """Show the summary of an estimate."""
     from rich.markup import escape
@@ -69,8 +77,7 @@ def say(summary: dict[str, Any]) -> None:
         table.add_row(name, str(row["unit"]), *numbers)
     out.print(table)
     out.print(f"\n[bold]verdict[/]: {summary['verdict']}")
-    for finding in summary["findings"]:
-        out.print(f"  [{_STYLE[finding['severity']]}]{finding['severity']:<4}[/] {escape(finding['text'])}")
+    say_findings(out, summary["findings"])
     out.print(
         f"\nwrote {escape(summary['result'])}" + (f" and {escape(summary['report'])}" if summary["report"] else "")
     )

@@ -1,6 +1,21 @@
-"""Coefficients of a vehicle from its own drives."""
+"""Coefficients of a vehicle from its own drives, and whether a vehicle file fits a drive."""
 
 from codriver.identify.brake import BrakeFit, Coefficient, Refusal, identify_brake
-from codriver.identify.ratio import RatioFit, identify_ratio
+from codriver.identify.check_log import check_vehicle_against_log
+from codriver.identify.learning import LearningPoint
+from codriver.identify.pedal import PedalFit, identify_pedal
+from codriver.identify.ratio import GearRatio, RatioFit, identify_ratio
 
-__all__ = ["BrakeFit", "Coefficient", "RatioFit", "Refusal", "identify_brake", "identify_ratio"]
+__all__ = [
+    "BrakeFit",
+    "Coefficient",
+    "GearRatio",
+    "LearningPoint",
+    "PedalFit",
+    "RatioFit",
+    "Refusal",
+    "check_vehicle_against_log",
+    "identify_brake",
+    "identify_pedal",
+    "identify_ratio",
+]

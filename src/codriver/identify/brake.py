@@ -251,7 +251,10 @@ def _badly_told(fit: Regression, names: list[str], M: float) -> tuple[str, str]:
         k = names.index("kappa_2")
         value, sd = float(fit.solution[k]), float(fit.sd[k])
         if not sd <= DRAG_SD * abs(value) or fit.freedom < LEAST_FREEDOM:
-            return "kappa_2", f"{value:.3g} kg/m with a standard error of {sd:.2g}: too few different speeds to tell drag from kappa_1"
+            return (
+                "kappa_2",
+                f"{value:.3g} kg/m with a standard error of {sd:.2g}: too few different speeds to tell drag from kappa_1",
+            )
     return "", ""
 
 
@@ -334,7 +337,9 @@ def _refuse_values(found: Mapping[str, Coefficient], fit: Regression, M: float, 
     elif "kappa_2" not in names:
         refused.append(Refusal("kappa_1", "it cannot be told from the drag at these speeds"))
     if (k2 := found.get("kappa_2")) is not None and k2.value < 0:
-        refused.append(Refusal("kappa_2", f"{k2.value:.3g} kg/m is negative: a wrong mass, tau, or unit of torque or speed?"))
+        refused.append(
+            Refusal("kappa_2", f"{k2.value:.3g} kg/m is negative: a wrong mass, tau, or unit of torque or speed?")
+        )
     return refused
 
 

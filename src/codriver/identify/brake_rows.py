@@ -20,7 +20,7 @@ import numpy as np
 
 from codriver.errors import MissingSignal
 from codriver.identify.low_pass import centred, low_pass, rate
-from codriver.identify.usable import filled, inside, usable
+from codriver.identify.usable import BRAKING, filled, inside, usable
 from codriver.signals import Log
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
@@ -42,6 +42,7 @@ class DriveRows:
         keep: usable ticks.
         share: of the ticks that were left out, by reason.
         pressed: ticks with the brake pressed.
+        shifting: ticks around gear shifts.
     """
 
     dt: float
@@ -56,6 +57,7 @@ class DriveRows:
     keep: Flags
     share: Mapping[str, float]
     pressed: Flags
+    shifting: Flags
 
     @property
     def log_of(self) -> Array:
@@ -64,7 +66,13 @@ class DriveRows:
 
 
 def drive_rows(
-    logs: Sequence[Log], gears: int, dt: float, *, known_gears: bool, pressure: bool = True, without_braking: bool = False
+    logs: Sequence[Log],
+    gears: int,
+    dt: float,
+    *,
+    known_gears: bool,
+    pressure: bool = True,
+    without_braking: bool = False,
 ) -> DriveRows:
     """Sample, mask and filter.
 
@@ -83,7 +91,7 @@ def drive_rows(
     sizes = [part.time.size for part in parts]
     joined = {
         name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("time", "y", "torque", "pressure", "square", "rate", "gear", "keep", "pressed")
+        for name in ("time", "y", "torque", "pressure", "square", "rate", "gear", "keep", "pressed", "shifting")
     }
     total = max(sum(sizes), 1)
     share = {
@@ -108,9 +116,7 @@ def _one(log: Log, gears: int, dt: float, known_gears: bool, pressure: bool, wit
     stop = min(float(log[name].time[-1]) if len(log[name]) else start for name in needed)
     grid = centred(log, SIGNALS).sample((*SIGNALS, *STATES), dt, start=start, stop=max(stop, start))
     judged = usable(grid, needed, gears if known_gears else None, without_braking=without_braking)
-    values = {
-        name: filled(grid.values[name], grid.held[name] & inside(name, grid.values[name])) for name in SIGNALS
-    }
+    values = {name: filled(grid.values[name], grid.held[name] & inside(name, grid.values[name])) for name in SIGNALS}
     v = values["longitudinal_speed"]
     gear = filled(grid.values["gear"], np.isfinite(grid.values["gear"])) if "gear" in log else np.ones(len(grid))
     by_gear = np.where(gear[:, None] == np.arange(1, gears + 1), values["engine_torque"][:, None], 0.0)
@@ -120,7 +126,7 @@ def _one(log: Log, gears: int, dt: float, known_gears: bool, pressure: bool, wit
     switch = np.nan_to_num(grid.values["brake_switch"]) > 0.5
     return DriveRows(
         dt, np.array([0, len(grid)]), grid.time, filtered[:, 0], filtered[:, 3:], filtered[:, 1], filtered[:, 2],
-        rate(v, dt), gear, judged.keep, judged.share, switch | (values["brake_pressure"] > 0.7e5),
+        rate(v, dt), gear, judged.keep, judged.share, switch | (values["brake_pressure"] > BRAKING), judged.left_out["shift"],
     )  # fmt: skip
 
 

@@ -117,7 +117,7 @@ def identify_pedal(
         LogError: too little pedal, or a request that is no multiple of the pedal; the message says which.
     """
     logs = [logs] if isinstance(logs, Log) else list(logs)
-    parts = [_one(log, dt) for log in logs]
+    parts = [pedal_rows(log, dt) for log in logs]
     pedal, request = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
     keep = np.concatenate([part[2] for part in parts])
     sizes = [part[2].size for part in parts]
@@ -152,8 +152,8 @@ def identify_pedal(
     )  # fmt: skip
 
 
-def _one(log: Log, dt: float) -> tuple[Array, Array, Flags, dict[str, float]]:
-    """Filtered pedal and request of one log, which ticks may be used, and the shares left out."""
+def pedal_rows(log: Log, dt: float) -> tuple[Array, Array, Flags, dict[str, float]]:
+    """Filtered pedal and request of one log on ticks of dt, which ticks may be used, and the shares left out by reason."""
     start = max(float(log[name].time[0]) if len(log[name]) else 0.0 for name in SIGNALS)
     stop = min(float(log[name].time[-1]) if len(log[name]) else start for name in SIGNALS)
     grid = centred(log, SIGNALS).sample((*SIGNALS, "gear", "clutch"), dt, start=start, stop=max(stop, start))

@@ -171,7 +171,9 @@ def identify_ratio(logs: Log | Sequence[Log], *, dt: float = 0.01, seed: int = 0
         seconds = float(there.sum() * dt)
         spread = float(rows.torque[there, gear - 1].std()) if there.any() else 0.0
         if seconds < LEAST_SECONDS or spread < LEAST_TORQUE_SPREAD:
-            refused[gear] = f"{seconds:.1f} s of moving with the brake released, in which the torque varies by {spread:.1f} N m"
+            refused[gear] = (
+                f"{seconds:.1f} s of moving with the brake released, in which the torque varies by {spread:.1f} N m"
+            )
         else:
             driven.append(gear)
     names = ", ".join(log.source or "a log in memory" for log in logs)
@@ -201,9 +203,7 @@ def identify_ratio(logs: Log | Sequence[Log], *, dt: float = 0.01, seed: int = 0
     )  # fmt: skip
 
 
-def _fit(
-    rows: DriveRows, driven: list[int], seed: int, names: str
-) -> tuple[Regression, tuple[float, float] | None]:
+def _fit(rows: DriveRows, driven: list[int], seed: int, names: str) -> tuple[Regression, tuple[float, float] | None]:
     """The regression on the gears driven, and gamma with its standard error if it is among the columns.
 
     Raises:

@@ -71,9 +71,7 @@ def regress(X: Array, y: Array, offered: Flags, pieces: Array, *, seed: int = 0,
         LogError: there are too few rows, or columns that cannot be told apart.
     """
     if offered.sum() <= X.shape[1]:
-        raise LogError(
-            f"{int(offered.sum())} usable ticks", f"more than {X.shape[1]}, by far", "record a longer drive"
-        )
+        raise LogError(f"{int(offered.sum())} usable ticks", f"more than {X.shape[1]}, by far", "record a longer drive")
     used = trimmed_rows(X, y, offered) if trim else offered.copy()
     solution = solve(X[used], y[used])
     e = y - X @ solution

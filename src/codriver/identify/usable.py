@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from codriver.identify.low_pass import RATE_PASS, low_pass, rate
+from codriver.identify.low_pass import low_pass, rate, smooth
 from codriver.names import VOCABULARY
 from codriver.signals import Grid
 from codriver.signals.grid import Flags
@@ -54,11 +54,16 @@ class Usable:
 
     Attributes:
         keep: shape (n,).
-        share: of all ticks, by reason, left out for it; one tick can have several reasons.
+        left_out: by reason, shape (n,); one tick can have several reasons.
     """
 
     keep: Flags
-    share: Mapping[str, float]
+    left_out: Mapping[str, Flags]
+
+    @property
+    def share(self) -> dict[str, float]:
+        """Of all ticks, by reason, left out for it."""
+        return {reason: float(mask.mean()) if mask.size else 0.0 for reason, mask in self.left_out.items()}
 
 
 def usable(grid: Grid, needed: tuple[str, ...], known_gears: int | None, *, without_braking: bool = False) -> Usable:
@@ -93,7 +98,7 @@ def usable(grid: Grid, needed: tuple[str, ...], known_gears: int | None, *, with
         widened(left_out[reason], 0.0, 0.2, dt) for reason in ("missing", "absurd")
     )
     keep = ~np.any(list(left_out.values()), axis=0)
-    return Usable(keep, {reason: float(mask.mean()) if n else 0.0 for reason, mask in left_out.items()})
+    return Usable(keep, left_out)
 
 
 def widened(mask: Flags, before: float, after: float, dt: float) -> Flags:
@@ -143,7 +148,7 @@ def _absurd(grid: Grid, needed: tuple[str, ...]) -> Flags:
 def _slip(grid: Grid, bad: Flags) -> Flags:
     """Where accelerometer and change of speed part by far more than slope, bias and pitch can make them."""
     dt = grid.dt
-    y = low_pass(low_pass(filled(grid.values["longitudinal_acceleration"], ~bad), dt), dt, RATE_PASS)
+    y = smooth(low_pass(filled(grid.values["longitudinal_acceleration"], ~bad), dt), dt)
     apart = y - rate(filled(grid.values["longitudinal_speed"], ~bad), dt)
     if not apart.size:
         return np.zeros(0, bool)
