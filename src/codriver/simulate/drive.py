@@ -1,8 +1,8 @@
 """One drive: road, driver and car together, step by step, recorded.
 
 The motion is integrated in steps of 2 ms (the fastest part, a slipping clutch, has a time constant of about 6 ms);
-the driver decides every 20 ms. Plain floats: a drive of 3 minutes takes well under a second, one of 42 minutes some
-ten seconds. Should that ever be too slow, `Car`, `Powertrain` and `Feet` use only + - * /, comparisons, tanh, a cube
+the driver decides every 20 ms. Plain floats: a drive of 3 minutes takes well under a second, one of 42 minutes four or
+six. Should that ever be too slow, `Car`, `Powertrain` and `Feet` use only + - * /, comparisons, tanh, a cube
 root and sin, and can be recorded and compiled as the observers are.
 """
 
@@ -101,10 +101,11 @@ def drive(
     style: Style | None = None,
     car: CarParameters | None = None,
     seed: int = 1,
+    distance: float = 0.0,
     speed: float = 0.0,
     record_every: int = 1,
 ) -> Trace:
-    """Drive along a road from its start.
+    """Drive along a road.
 
     Args:
         road: the road.
@@ -112,12 +113,12 @@ def drive(
         style: who drives; "ordinary" if not given.
         car: the car's true parameters; those of the 2017 paper if not given.
         seed: of the driver's scatter and of his idea of the car.
-        speed: at the start, m/s.
+        distance, speed: at the start, m and m/s; time begins at 0 wherever that is.
         record_every: steps of 2 ms between recorded rows; 5 (100 Hz) saves memory on long drives.
     """
     style, parameters = style or STYLES["ordinary"], car or CarParameters()
-    driver = Driver(style, road, parameters, seed, 0.0, speed)
-    body = Car(parameters, 0.0, speed)
+    driver = Driver(style, road, parameters, seed, distance, speed)
+    body = Car(parameters, distance, speed)
     train, feet, plan = body.powertrain, driver.feet, driver.plan
     slopes = road.slope.tolist()
     slopes.append(slopes[-1])

@@ -64,8 +64,13 @@ def write_drive(folder: str | Path, test: RoadTest, *, vehicle: Vehicle | None =
 
 def _files(folder: Path, vehicle: Vehicle | None) -> DriveFiles:
     """The files of a drive in a folder."""
-    names = ("drive.blf", "car.dbc", "names.toml", "truth.parquet")
-    return DriveFiles(*(folder / name for name in names), folder / "vehicle.toml" if vehicle else None)
+    return DriveFiles(
+        folder / "drive.blf",
+        folder / "car.dbc",
+        folder / "names.toml",
+        folder / "truth.parquet",
+        folder / "vehicle.toml" if vehicle else None,
+    )
 
 
 def _write(files: DriveFiles, test: RoadTest, vehicle: Vehicle | None) -> None:

@@ -9,8 +9,9 @@ with e the edges' times, rounded down to the unit's timer. A period without an e
 d / (t_k - e_last): the wheel cannot have been quicker, or an edge would have come. After d / v_least without an edge
 the wheel stands, v_k = 0; the first edge after that is only a beginning.
 
-At constant speed the timer's rounding leaves an error of standard deviation v delta / (sqrt(6) (e_last - e_first)),
-delta the timer's step: two independent uniform errors. The value shows the speed of half-way between the two edges, so
+At constant speed the timer's rounding leaves an error of standard deviation v sqrt(f (1 - f)) delta / (e_last - e_first),
+delta the timer's step and f the fraction of a step left over in n d / v; sqrt(f (1 - f)) is 1 / sqrt(6) in quadratic mean
+over speeds. The value shows the speed of half-way between the two edges, so
 it is late by (t_k - (e_first + e_last) / 2). Teeth are not cut evenly: each stands off by its own share of d, the same at
 every turn.
 """
@@ -34,7 +35,7 @@ def edge_times(time: Array, speed: Array, pitch: float, shares: Array, timer: fl
     """
     steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)
     way = np.maximum.accumulate(np.concatenate([[0.0], np.cumsum(steps)]))
-    count = int(way[-1] / pitch)
+    count = int(way[-1] / pitch + 0.5)
     places = (np.arange(1, count + 1) - 0.5) * pitch
     places += pitch * shares[np.arange(count) % shares.size]
     times = np.interp(places, way, time)
