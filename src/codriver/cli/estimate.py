@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as json_module
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,8 @@ from codriver.cli.options import Bus, Dbc, Ell, EstimatorName, Form, Json, LogPa
 if TYPE_CHECKING:
     from codriver.estimate import Estimate
     from codriver.signals import Log
+    from codriver.trust import Check
+    from codriver.vehicles import Vehicle
 
 
 def estimate(
@@ -78,9 +81,10 @@ def estimate_file(
         run = work or estimate_log
         result = run(name, recorded, vehicle, ell=ell, rate=rate, preset=preset, form=form)
         _refuse_empty(result)
+        check = _with_vehicle(result.check(), recorded, vehicle)
         stage(f"writing {out.name}" + (f" and {report.name}" if report is not None else ""))
-        _write(result, out, report, command_line(), truth)
-    told = _told(result, out, report, why)
+        _write(result, check, out, report, command_line(), truth)
+    told = _told(result, check, out, report, why)
     if as_json:
         typer.echo(json_module.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
     else:
@@ -94,14 +98,25 @@ def _check_outputs(out: Path, report: Path | None, log: Path) -> None:
     Raises:
         UsageError: they cannot, or the result would replace the recording.
     """
-    import os
-
     from codriver.errors import UsageError
     from codriver.logs.write import check_output
 
     check_output(out)
     if out.exists() and out.samefile(log):
         raise UsageError(f"-o {out} is the recording itself", "another name", "choose another -o; recordings are kept")
+    check_report(report)
+
+
+def check_report(report: Path | None) -> None:
+    """Whether a report can be written, asked before the long work.
+
+    Raises:
+        UsageError: it cannot.
+    """
+    import os
+
+    from codriver.errors import UsageError
+
     if report is None:
         return
     folder = report.parent
@@ -131,12 +146,31 @@ def _refuse_empty(result: Estimate) -> None:
     )
 
 
-def _write(result: Estimate, out: Path, report: Path | None, command: str, truth: Log | None) -> None:
+def _with_vehicle(check: Check, log: Log, vehicle: Vehicle | None) -> Check:
+    """The verdict with what the log itself says of the vehicle's parameters, which innovations do not show."""
+    if vehicle is None:
+        return check
+    from codriver.identify import check_vehicle_against_log
+
+    found = [f for f in check_vehicle_against_log(log, vehicle) if f.severity != "ok"]
+    order = {"bad": 0, "warn": 1, "ok": 2}
+    findings = sorted(
+        [*(replace(f, text=f"vehicle file: {f.text}") for f in found), *check.findings], key=lambda f: order[f.severity]
+    )
+    return replace(check, findings=tuple(findings))
+
+
+def _write(result: Estimate, check: Check, out: Path, report: Path | None, command: str, truth: Log | None) -> None:
     """Write result and report: both or neither."""
     from codriver.estimate_file import save_estimate
 
+    extra = {
+        "command": command,
+        "verdict": check.verdict,
+        "findings": json_module.dumps([f"{f.severity}: {f.text}" for f in check.findings], ensure_ascii=False),
+    }
     if report is None:
-        save_estimate(result, out, {"command": command})
+        save_estimate(result, out, extra)
         return
     from codriver.report import write_report
 
@@ -146,17 +180,16 @@ def _write(result: Estimate, out: Path, report: Path | None, command: str, truth
         write_report(
             result, draft, truth=truth, command=command, title=f"{result.observer}: {Path(result.log.source).name}"
         )
-        save_estimate(result, out, {"command": command})
+        save_estimate(result, out, extra)
         draft.replace(report)
     finally:
         draft.unlink(missing_ok=True)
 
 
-def _told(result: Estimate, out: Path, report: Path | None, why: str) -> dict[str, object]:
+def _told(result: Estimate, check: Check, out: Path, report: Path | None, why: str) -> dict[str, object]:
     """What the terminal shows and --json prints."""
     from codriver.summary import summarise, tell_findings
 
-    check = result.check()
     return {
         "estimator": result.observer,
         "why": why,

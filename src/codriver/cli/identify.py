@@ -251,7 +251,8 @@ def _say(told: Mapping[str, Any]) -> None:
     out = console()
     minutes = told["minutes"]
     out.print(
-        f"[bold]{escape(told['vehicle'])}[/] from {escape(', '.join(told['logs']))}: fitted on {minutes['fitted']:.1f} usable minutes"
+        f"[bold]{escape(told['vehicle'])}[/] from {escape(', '.join(told['logs']))}: "
+        f"fitted on {minutes['fitted']:.1f} usable minutes"
         + (f" ({minutes['braking']:.1f} braking)" if "braking" in minutes else "")
         + (f", validated on another {minutes['validated']:.1f}" if "validated" in minutes else "")
     )
@@ -271,7 +272,8 @@ def _say(told: Mapping[str, Any]) -> None:
         rmse = told["rmse"]
         before = "-" if rmse["old"] is None else f"{rmse['old']:.4g}"
         out.print(
-            f"\nvalidation RMSE {rmse['new']:.4g} {rmse['unit']}; with the old vehicle {before}, answering a constant {rmse['constant']:.4g}"
+            f"\nvalidation RMSE {rmse['new']:.4g} {rmse['unit']}; with the old vehicle {before}, "
+            f"answering a constant {rmse['constant']:.4g}"
         )
     out.print("\n[bold]verdict[/]:")
     say_findings(out, told["findings"])

@@ -127,8 +127,8 @@ class BrakeFit:
 
     def _source(self, letter: str, found: Coefficient) -> str:
         text = (
-            f"{letter} identified from {', '.join(self.sources) or 'a log in memory'}; 2017 eq. (19)-(20), "
-            f"{self.minutes_fit:.1f} usable minutes, validation RMSE {self.rmse:.3f} m/s^2 on another {self.minutes_validation:.1f}; "
+            f"{letter} identified from {', '.join(self.sources)}; 2017 eq. (19)-(20), {self.minutes_fit:.1f} usable minutes, "
+            f"validation RMSE {self.rmse:.3f} m/s^2 on another {self.minutes_validation:.1f}; "
             f"sd {found.sd:.3g} {found.unit} given M and tau"
         )
         if letter == "kappa_1" and not self.bias_known:
@@ -184,11 +184,12 @@ def identify_brake(
     most = max(min(round(4 * fit.length), 2000), 10)
     curve = learning_curve(X, force - M * rows.y - fixed, rows.y, force - fixed, fit, rows, second, M, names)
     return BrakeFit(
-        coefficients, tuple(refused), tuple(offsets), bias is not None, *(float(m.sum()) * dt / 60 for m in (first, second)),
-        float((first & rows.pressed).sum()) * dt / 60, rows.share, float(rows.keep.mean()), fit.trimmed,
+        coefficients, tuple(refused), tuple(offsets), bias is not None, _minutes(first, dt), _minutes(second, dt),
+        _minutes(first & rows.pressed, dt), rows.share, float(rows.keep.mean()), fit.trimmed,
         _rms(e[second]), _old(rows, force, vehicle, M, first, second),
         _rms(rows.y[second] - rows.y[first].mean()), fit.length * dt, fit.blocks, curve, rows, model, first, second,
-        np.arange(most + 1) * dt, autocorrelation(e, fit.used, rows.pieces, most), tuple(short_name(log) for log in logs),
+        np.arange(most + 1, dtype=float) * dt, autocorrelation(e, fit.used, rows.pieces, most),
+        tuple(short_name(log) for log in logs),
     )  # fmt: skip
 
 
@@ -357,6 +358,10 @@ def _old(rows: DriveRows, force: Array, vehicle: Vehicle, M: float, first: Flags
 def _sds(vehicle: Vehicle, name: str, count: int) -> Array:
     sd = vehicle.parameters[name].sd
     return np.broadcast_to(np.array(0.0 if sd is None else sd, dtype=float), (count,))
+
+
+def _minutes(mask: Flags, dt: float) -> float:
+    return float(mask.sum()) * dt / 60
 
 
 def _rms(x: Array) -> float:

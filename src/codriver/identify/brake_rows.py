@@ -15,11 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from codriver.errors import MissingSignal
 from codriver.identify.low_pass import centred, low_pass, rate
+from codriver.identify.standard_errors import Index
 from codriver.identify.usable import BRAKING, filled, inside, usable
 from codriver.signals import Log
 from codriver.signals.grid import Flags
@@ -46,7 +48,7 @@ class DriveRows:
     """
 
     dt: float
-    pieces: Array
+    pieces: Index
     time: Array
     y: Array
     torque: Array
@@ -60,7 +62,7 @@ class DriveRows:
     shifting: Flags
 
     @property
-    def log_of(self) -> Array:
+    def log_of(self) -> Index:
         """The number of each row's log, shape (n,)."""
         return np.repeat(np.arange(self.pieces.size - 1), np.diff(self.pieces))
 
@@ -130,10 +132,10 @@ def _one(log: Log, gears: int, dt: float, known_gears: bool, pressure: bool, wit
     )  # fmt: skip
 
 
-def halves(keep: Flags, pieces: Array) -> tuple[Flags, Flags]:
+def halves(keep: Flags, pieces: Index) -> tuple[Flags, Flags]:
     """The usable ticks of each log's first half, and of its second, by their count."""
     first = np.zeros_like(keep)
-    for i, k in zip(pieces[:-1], pieces[1:], strict=True):
+    for i, k in pairwise(pieces):
         rows = i + np.flatnonzero(keep[i:k])
         first[rows[: rows.size // 2]] = True
     return first, keep & ~first

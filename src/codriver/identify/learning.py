@@ -68,9 +68,9 @@ def learning_curve(
     V, w = X[validation], target[validation]
     A_v, b_v, s_v = V.T @ V, V.T @ w, float(w @ w)
     points = []
-    for A_m, b_m, S_m, n_m, p_m in zip(
+    for A_m, b_m, S_m, minutes, minutes_braking in zip(
         np.cumsum(A, axis=0), np.cumsum(b, axis=0), np.cumsum(scores[:, :, None] * scores[:, None, :], axis=0),
-        np.cumsum(ticks), np.cumsum(braking), strict=True,
+        (np.cumsum(ticks) * rows.dt / 60).tolist(), (np.cumsum(braking) * rows.dt / 60).tolist(), strict=True,
     ):  # fmt: skip
         there = np.diag(A_m) > 0  # logs that have begun
         inner = np.ix_(there, there)
@@ -84,6 +84,6 @@ def learning_curve(
             k = int(there[:place].sum())
             value = float(theta[place])
             sd = float(np.sqrt((inverse @ S_m[inner] @ inverse)[k, k]))
-            rmse = float(np.sqrt(max(theta @ A_v @ theta - 2 * theta @ b_v + s_v, 0.0) / max(len(w), 1))) / M
-        points.append(LearningPoint(float(n_m) * rows.dt / 60, float(p_m) * rows.dt / 60, value, sd, rmse))
+            rmse = float(np.sqrt(max(float(theta @ A_v @ theta - 2 * theta @ b_v) + s_v, 0.0) / max(len(w), 1))) / M
+        points.append(LearningPoint(minutes, minutes_braking, value, sd, rmse))
     return tuple(points)

@@ -146,7 +146,7 @@ def identify_pedal(
         c_r, sd, float(fit.sd_hac[0]), c_r - half, c_r + half, r2, offset, curvature,
         _findings(c_r, r2, offset, curvature, fit.trimmed), _rms(e[second]),
         None if old is None else _rms((request - old * pedal)[second]),
-        _rms(request[second] - request[first].mean()), *(float(m.sum()) * dt / 60 for m in (first, second)), share,
+        _rms(request[second] - request[first].mean()), float(first.sum()) * dt / 60, float(second.sum()) * dt / 60, share,
         float(keep.mean()), fit.trimmed, fit.length * dt, fit.blocks, pedal, request, first, second,
         tuple(short_name(log) for log in logs),
     )  # fmt: skip
@@ -190,7 +190,8 @@ def _straight(p: Array, T: Array, c_r: float) -> tuple[float, float, float]:
     r2 = 1.0 - float(np.sum((T - c_r * p) ** 2)) / spread if spread > 0 else 0.0
     offset = float(solve(np.column_stack([np.ones_like(p), p]), T)[0])
     a, b, c = solve(np.column_stack([np.ones_like(p), p, p * p]), T)
-    at = np.linspace(*np.quantile(p, [0.025, 0.975]), 50)
+    low, high = np.quantile(p, [0.025, 0.975])
+    at = np.linspace(low, high, 50)
     greatest = c_r * at[-1]
     return r2, offset, float(np.abs(a + b * at + c * at * at - c_r * at).max() / greatest) if greatest > 0 else np.inf
 
@@ -221,7 +222,7 @@ def _findings(c_r: float, r2: float, offset: float, curvature: float, trimmed: f
     ))]  # fmt: skip
     if trimmed > 0.05:
         found.append(Finding(
-            "warn", f"{trimmed:.0%} of the moments do not fit and were left out: cruise control, a rev limiter or another controller?"
+            "warn", f"{trimmed:.0%} of the moments do not fit and were left out: cruise control, a rev limiter, another controller?"
         ))  # fmt: skip
     return tuple(found)
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from codriver.errors import LogError
-from codriver.identify.standard_errors import block_bootstrap, block_length, block_sums, blocks_of, newey_west
+from codriver.identify.standard_errors import Index, block_bootstrap, block_length, block_sums, blocks_of, newey_west
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
 
@@ -56,7 +56,7 @@ class Regression:
         return float(stdtrit(self.freedom, 0.975)) if self.freedom > 0 else float("inf")
 
 
-def regress(X: Array, y: Array, offered: Flags, pieces: Array, *, seed: int = 0, trim: bool = True) -> Regression:
+def regress(X: Array, y: Array, offered: Flags, pieces: Index, *, seed: int = 0, trim: bool = True) -> Regression:
     """Fit and judge.
 
     Args:

@@ -16,17 +16,22 @@ Newey, West 1987, doi:10.2307/1913610; Kunsch 1989, doi:10.1214/aos/1176347265 (
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
+import numpy.typing as npt
 
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
+
+Index = npt.NDArray[np.intp]  # first rows of logs or blocks
 
 DRAWS = 500
 LEAST_ALIKE = 0.05
 LONGEST = 0.25  # of a piece: no autocorrelation is looked for beyond
 
 
-def autocorrelation(e: Array, used: Flags, pieces: Array, most: int) -> Array:
+def autocorrelation(e: Array, used: Flags, pieces: Index, most: int) -> Array:
     """Autocorrelation of residuals that have holes, lags 0 to `most`.
 
     Args:
@@ -39,7 +44,7 @@ def autocorrelation(e: Array, used: Flags, pieces: Array, most: int) -> Array:
 
     product, pairs = np.zeros(most + 1), np.zeros(most + 1)
     mean = float(e[used].mean()) if used.any() else 0.0
-    for i, k in zip(pieces[:-1], pieces[1:], strict=True):
+    for i, k in pairwise(pieces):
         there = used[i:k].astype(float)
         size = next_fast_len(int(k - i) + most + 1, real=True)
         for x, total in (((e[i:k] - mean) * there, product), (there, pairs)):
@@ -50,7 +55,7 @@ def autocorrelation(e: Array, used: Flags, pieces: Array, most: int) -> Array:
     return np.asarray(covariance / covariance[0]) if covariance[0] > 0 else np.zeros(most + 1)
 
 
-def block_length(e: Array, used: Flags, pieces: Array) -> int:
+def block_length(e: Array, used: Flags, pieces: Index) -> int:
     """L, ticks: see the module's docstring."""
     longest = int(np.diff(pieces).max())
     rho = autocorrelation(e, used, pieces, max(min(round(LONGEST * longest), 20_000), 1))
@@ -60,7 +65,7 @@ def block_length(e: Array, used: Flags, pieces: Array) -> int:
     return max(round(alike * (max(float(used.sum()) / alike, 1.0)) ** (1 / 3)), 1)
 
 
-def newey_west(X: Array, e: Array, used: Flags, pieces: Array, length: int) -> Array:
+def newey_west(X: Array, e: Array, used: Flags, pieces: Index, length: int) -> Array:
     """Covariance of the coefficients, Bartlett weights, greatest lag `length` - 1.
 
     Args:
@@ -72,7 +77,7 @@ def newey_west(X: Array, e: Array, used: Flags, pieces: Array, length: int) -> A
     """
     scores = X * np.where(used, e, 0.0)[:, None]
     S = np.zeros((X.shape[1],) * 2)
-    for i, k in zip(pieces[:-1], pieces[1:], strict=True):
+    for i, k in pairwise(pieces):
         total = np.vstack([np.zeros((1, X.shape[1])), np.cumsum(scores[i:k], axis=0)])
         n = k - i
         ends = np.arange(1, n + length)
@@ -82,7 +87,7 @@ def newey_west(X: Array, e: Array, used: Flags, pieces: Array, length: int) -> A
     return np.asarray(inverse @ S @ inverse)
 
 
-def blocks_of(used: Flags, pieces: Array, length: int) -> tuple[Array, Array]:
+def blocks_of(used: Flags, pieces: Index, length: int) -> tuple[Index, Index]:
     """Blocks of at least `length` used ticks, within one log.
 
     Returns:
@@ -90,7 +95,7 @@ def blocks_of(used: Flags, pieces: Array, length: int) -> tuple[Array, Array]:
     """
     starts: list[int] = []
     logs: list[int] = []
-    for number, (i, k) in enumerate(zip(pieces[:-1], pieces[1:], strict=True)):
+    for number, (i, k) in enumerate(pairwise(pieces)):
         rows = i + np.flatnonzero(used[i:k])
         count = max(rows.size // length, 1)
         cuts = rows[np.arange(1, count) * rows.size // count] if rows.size else []
@@ -99,7 +104,7 @@ def blocks_of(used: Flags, pieces: Array, length: int) -> tuple[Array, Array]:
     return np.array([*starts, used.size]), np.array(logs)
 
 
-def block_sums(X: Array, y: Array, used: Flags, starts: Array) -> tuple[Array, Array]:
+def block_sums(X: Array, y: Array, used: Flags, starts: Index) -> tuple[Array, Array]:
     """X'X and X'y of each block: shapes (blocks, p, p) and (blocks, p)."""
     there = X * used[:, None]
     p = X.shape[1]
@@ -110,7 +115,7 @@ def block_sums(X: Array, y: Array, used: Flags, starts: Array) -> tuple[Array, A
     return A, np.add.reduceat(there * y[:, None], starts[:-1], axis=0)
 
 
-def block_bootstrap(A: Array, b: Array, logs: Array, seed: int, draws: int = DRAWS) -> Array:
+def block_bootstrap(A: Array, b: Array, logs: Index, seed: int, draws: int = DRAWS) -> Array:
     """Covariance of the coefficients by drawing blocks with replacement, each log's from its own.
 
     Args:

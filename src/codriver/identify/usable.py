@@ -34,7 +34,7 @@ AROUND_SLOW = 0.5  # s
 AFTER_BRAKING = 1.0  # s left out around braking: pressure and regeneration fade
 OPEN_CLUTCH = 0.05
 SLIP, SLIP_MARGIN, USUAL = 1.5, 0.5, 10.0  # m/s^2; s; s over which slope and bias stay alike
-AT_END, LEAST_END = 0.1, {"longitudinal_acceleration": 3.0, "brake_pressure": 2e6}  # s; m/s^2, Pa
+AT_END, LEAST_END = 0.3, {"longitudinal_acceleration": 3.0, "brake_pressure": 2e6}  # s; m/s^2, Pa
 BRAKING = 0.7e5  # Pa
 REASONS: Mapping[str, str] = {
     "missing": "a signal missing or too old",

@@ -64,8 +64,8 @@ def brake_findings(fit: BrakeFit) -> list[tuple[str, str]]:
     gamma = fit.coefficients.get("gamma")
     if gamma is not None and abs(gamma.value) > ODD_GAIN:
         said.append((
-            "bad", f"the accelerometer's gain error comes out as {gamma.value:.1%}, which is no pitch: mass or tau of the vehicle file "
-            "is wrong, or the scale of accelerometer or speed; c_b goes with tau",
+            "bad", f"the accelerometer's gain error comes out as {gamma.value:.1%}, which is no pitch: mass or tau of the vehicle "
+            "file is wrong, or the scale of accelerometer or speed; c_b goes with tau",
         ))  # fmt: skip
     for found in fit.coefficients.values():
         if not 0.5 < found.sd_hac / found.sd < 2.0:
@@ -107,7 +107,8 @@ def brake_document(fit: BrakeFit, old: Vehicle, command: str = "") -> Document:
         "second to validate (2017, section IV-A, doi:10.1109/TMECH.2017.2716838).",
         (
             Section("Result", (
-                Table(HEAD, tuple(brake_rows(fit, old)), "sd and interval hold the standard deviations of M and tau, where the vehicle has them."),
+                Table(HEAD, tuple(brake_rows(fit, old)),
+                      "sd and interval hold the standard deviations of M and tau, where the vehicle has them."),
                 Findings(tuple(brake_findings(fit))), quality,
                 "Without a known bias, kappa_1 cannot be told from the accelerometer's bias d_a: what is found is kappa_1 - M d_a. "
                 "gamma is how much more acceleration the sensor shows than the wheels, mostly the pitch of the body.",
@@ -217,8 +218,8 @@ def _figure_1(fit: BrakeFit) -> Chart:
             Curve("[y1]_F, accelerometer", time, rows.y[part], "#1a1a1a"),
             Curve("a_ID, from torque, pressure and speed", time, fit.model[part], "#C84C00"),
         ), 300, (0.0,)),),
-        "Pink: braking; blue: gear shifts, which are left out with a second after them, for the driveline rings; grey: left out for "
-        "another reason. The two curves should lie on one another outside the blue.",
+        "Pink: braking; blue: gear shifts, which are left out with a second after them, for the driveline rings; grey: left "
+        "out for another reason. The two curves should lie on one another outside the blue.",
         tuple(spans),
     )  # fmt: skip
 
@@ -256,11 +257,12 @@ def _figure_3(fit: PedalFit) -> Chart:
     return Chart(
         "Figure 3: requested torque over accelerator pedal", "pedal (%)",
         (Plot("requested torque (N m)", (
-            Curve("measured, low-passed at 5 Hz", 100 * fit.pedal[rows], fit.request[rows], "#0072B2", "points", width=3, faint=True),
+            Curve("measured, low-passed at 5 Hz", 100 * fit.pedal[rows], fit.request[rows], "#0072B2", "points", width=3,
+                  faint=True),
             Curve(f"T_r = {fit.c_r:.1f} N m p_r", 100 * line, fit.c_r * line, "#C84C00", width=2.0),
         ), 360),),
-        f"R2 {fit.r2:.4f}. Points that leave the line in a bundle are a controller's work; a cloud around a curve is a pedal map that "
-        "is not linear.",
+        f"R2 {fit.r2:.4f}. Points that leave the line in a bundle are a controller's work; a cloud around a curve is a pedal map "
+        "that is not linear.",
     )  # fmt: skip
 
 
