@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from codriver import __version__
-from codriver.cli import check, demo, estimate, export, identify, info, simulate, smooth
+from codriver.cli import check, demo, estimate, export, identify, info, simulate, smooth, tune
 from codriver.errors import CodriverError
 
 app = typer.Typer(
@@ -30,6 +30,7 @@ app.command("demo")(demo.demo)
 app.command("info")(info.info)
 app.command("estimate")(estimate.estimate)
 app.command("smooth")(smooth.smooth)
+app.command("tune")(tune.tune)
 app.add_typer(check.app, name="check")
 app.add_typer(identify.app, name="identify")
 app.add_typer(export.app, name="export")

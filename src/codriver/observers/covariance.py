@@ -25,7 +25,7 @@ def predict_covariance(P: Matrix, F: Array | Matrix, Q: Array | Matrix) -> Matri
     n = len(P)
     FP = [[_dot([(F[i][k], P[k][j]) for k in range(n)]) for j in range(n)] for i in range(n)]
     return symmetric(
-        [[_dot([(F[j][k], FP[i][k]) for k in range(n)]) + _plain(Q[i][j]) for j in range(n)] for i in range(n)]
+        [[_dot([(F[j][k], FP[i][k]) for k in range(n)]) + plain(Q[i][j]) for j in range(n)] for i in range(n)]
     )
 
 
@@ -81,6 +81,6 @@ def _dot(pairs: list[tuple[Scalar, Scalar]]) -> Scalar:
     return 0.0 if total is None else total
 
 
-def _plain(x: Scalar) -> Scalar:
+def plain(x: Scalar) -> Scalar:
     """A Python float instead of a numpy one, which CasADi would take for a matrix; symbols as they are."""
     return float(x) if isinstance(x, (int, float)) else x

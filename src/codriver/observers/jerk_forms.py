@@ -13,7 +13,7 @@ import numpy as np
 
 from codriver.kernel import Scalar, either, minimum, negate, select
 from codriver.models import intention_model
-from codriver.observers.covariance import Matrix, predict_covariance, update_row
+from codriver.observers.covariance import Matrix, plain, predict_covariance, update_row
 from codriver.observers.observer import Scalars
 from codriver.observers.scaled_gain import ScaledGain
 
@@ -80,13 +80,13 @@ def kalman_update(design: ScaledGain, carry: Scalars, x: list[Scalar], now: Situ
     """Predict the covariance and update with the rows that are there.
 
     Args:
-        design: gains at one ell and tick.
+        design: gains at one ell and tick; F, Qd, Rd and P may hold symbols.
         carry: with the scalars of `initial`.
         x: predicted states.
         now: the tick.
     """
     C, P_stationary = intention_model().C, design.P
-    wide = [[WIDE_START * float(P_stationary[i, j]) if i == j else 0.0 for j in range(4)] for i in range(4)]
+    wide = [[WIDE_START * plain(P_stationary[i, j]) if i == j else 0.0 for j in range(4)] for i in range(4)]
     P: Matrix = [[0.0] * 4 for _ in range(4)]
     for i, j in _PAIRS:
         P[i][j] = P[j][i] = carry[f"P_{STATES[i]}_{STATES[j]}"]
@@ -105,7 +105,7 @@ def kalman_update(design: ScaledGain, carry: Scalars, x: list[Scalar], now: Situ
         {"acceleration": (e_a, s_a, now.use_a), "speed": (e_v, s_v, now.use_v)},
         [P[i][i] for i in range(4)],
         {f"P_{STATES[i]}_{STATES[j]}": P[i][j] for i, j in _PAIRS},
-        P[3][3] <= SETTLED * float(P_stationary[3, 3]),
+        P[3][3] <= SETTLED * plain(P_stationary[3, 3]),
     )
 
 

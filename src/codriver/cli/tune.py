@@ -1,0 +1,194 @@
+"""codriver tune: noise and knob from recorded drives, and where they lie on the curve of delay against noise."""
+
+from __future__ import annotations
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from codriver.cli.options import Bus, Dbc, EstimatorName, Json, Names, PresetName, VehicleName
+
+if TYPE_CHECKING:
+    from codriver.tune import Point, Tuning
+
+
+def tune(
+    estimator: EstimatorName,
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Recordings of one vehicle.", show_default=False)
+    ],
+    vehicle: VehicleName = None,
+    dbc: Dbc = None,
+    names: Names = None,
+    delay: Annotated[
+        float | None,
+        typer.Option("--delay", metavar="S", help="Choose ell for this delay of slow changes, s.", show_default=False),
+    ] = None,
+    likelihood: Annotated[
+        bool, typer.Option("--likelihood", help="Fit Q and R by maximum likelihood. Default without --delay.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="OUT", help="Preset to write (.toml).", show_default=False)
+    ] = None,
+    rate: Annotated[
+        float | None, typer.Option("--rate", help="Ticks per second. Default: from the logs.", show_default=False)
+    ] = None,
+    preset: PresetName = None,
+    bus: Bus = None,
+    report: Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)] = None,
+    json: Json = False,
+) -> None:
+    """Tune the noise of an estimator on recorded drives: by likelihood, by a wanted delay, or both.
+
+    Example: codriver tune intent drive.blf --dbc car.dbc --names names.toml --vehicle bisoffi2017 --delay 0.4 -o mine.toml
+    """
+    from codriver.cli.estimate import check_report
+    from codriver.cli.options import check_inputs
+    from codriver.cli.terminal import command_line, working
+    from codriver.logs import read
+    from codriver.observers import find_preset, save_preset
+    from codriver.run import check_rate
+    from codriver.tune import tune as tuned
+    from codriver.vehicles import load_vehicle
+
+    for log in logs:
+        check_inputs(log, dbc, names)
+    inputs = [*logs, dbc, names, *(Path(name) for name in (vehicle, preset) if name is not None)]
+    if out is not None:
+        _check_out(out, inputs)
+    check_report(report)
+    check_rate(rate)
+    if preset is not None:
+        find_preset(preset)
+    car = load_vehicle(vehicle) if vehicle is not None else None
+    with working(not json, 3) as stage:
+        stage(f"reading {', '.join(log.name for log in logs)}")
+        recorded = [read(log, dbc=dbc, names=names, bus=bus) for log in logs]
+        stage("tuning")
+        name = out.stem if out is not None else "own"
+        fit = True if likelihood else None
+        result = tuned(recorded, estimator, car, preset=preset, delay=delay, likelihood=fit, rate=rate, name=name)
+        stage("writing")
+        if report is not None:
+            from codriver.report.document import write_document
+            from codriver.report.tuning import tuning_document
+
+            write_document(tuning_document(result, str(out or ""), command_line()), report)
+        if out is not None:
+            save_preset(result.preset, out)
+    told = told_of(result, out, report)
+    if json:
+        typer.echo(json_module.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
+    else:
+        _say(result, told)
+
+
+def _check_out(out: Path, inputs: list[Path | None]) -> None:
+    """Whether a preset can be written here, asked before the long work.
+
+    Raises:
+        UsageError: it cannot, or it would replace something that is no preset.
+    """
+    import os
+
+    from codriver.errors import UsageError
+    from codriver.observers import PRESETS, find_preset
+
+    if out.suffix != ".toml" or out.is_dir():
+        raise UsageError(f"-o {out}", "the name of a file ending in .toml", "rename it")
+    if out.stem in PRESETS:
+        raise UsageError(f"-o {out}: '{out.stem}' is the name of a paper's preset", "a name of your own", "rename it")
+    if not out.parent.is_dir() or not os.access(out.parent, os.W_OK):
+        raise UsageError(
+            f"-o {out}: the folder does not exist or may not be written", "a folder to write into", "check it"
+        )
+    if not out.exists():
+        return
+    if any(path is not None and path.exists() and out.samefile(path) for path in inputs):
+        raise UsageError(f"-o {out} is an input", "another name", "choose another -o; inputs are kept")
+    try:
+        find_preset(out)
+    except UsageError:
+        raise UsageError(f"-o {out} is there already and no preset", "a new name", "choose another -o") from None
+
+
+def told_of(result: Tuning, out: Path | None, report: Path | None) -> dict[str, Any]:
+    """What --json prints."""
+    fit = result.noise
+    return {
+        "estimator": result.estimator,
+        "vehicle": result.vehicle,
+        "logs": list(result.logs),
+        "counted_s": round(result.seconds, 3),
+        "rate_hz": round(1 / result.dt, 6),
+        "sensor_noise": {"acceleration": _finite(result.sensors[0]), "speed": _finite(result.sensors[1])},
+        "begun_with": result.begun.name,
+        "preset": {
+            "name": result.preset.name, "source": result.preset.source, "ell": result.preset.ell,
+            "Q": list(result.preset.Q), "R": list(result.preset.R),
+        },
+        "wanted_delay_s": result.delay,
+        "log_likelihood": {"begun": fit.start.log_likelihood if fit else None, "found": result.evidence.log_likelihood},
+        "most_likely_ell": {"ell": result.profile.best, "sd_of_log": _finite(result.profile.spread)},
+        "converged": fit.converged if fit else None,
+        "ratios": [
+            {"name": r.name, "begun": r.start, "found": r.found, "sd_of_log": _finite(r.spread), "told": r.told}
+            for r in (fit.ratios if fit else ())
+        ],
+        "settings": [_point(p) for p in result.marks],
+        "chosen": _point(result.chosen),
+        "result": str(out) if out is not None else None,
+        "report": str(report) if report is not None else None,
+    }  # fmt: skip
+
+
+def _point(p: Point) -> dict[str, Any]:
+    return {
+        "ell": p.ell, "delay_s": p.slow_delay, "delay_at_these_rates_s": p.delay, "bandwidth_hz": p.bandwidth,
+        "jerk_noise": _finite(p.noise), "calm_jerk": p.calm,
+    }  # fmt: skip
+
+
+def _finite(x: float) -> float | None:
+    """A number; None for what JSON does not know."""
+    return x if abs(x) < float("inf") else None
+
+
+def _say(result: Tuning, told: dict[str, Any]) -> None:
+    """The summary for people."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    from codriver.cli.terminal import console
+
+    out = console()
+    out.print(
+        f"[bold]{result.estimator}[/] tuned on {escape(', '.join(result.logs))}: {result.seconds:.0f} s that count, at "
+        f"{1 / result.dt:g} Hz; sensors scatter {result.sensors[0]:.3g} m/s^2 and {result.sensors[1]:.3g} m/s\n"
+    )
+    table = Table(box=None, pad_edge=False)
+    for column in ("setting", "ell", "delay, s", "-3 dB, Hz", "jerk noise, m/s^3", "in calm stretches"):
+        table.add_column(column, justify="left" if column == "setting" else "right")
+    for label, p in [*((result.begun.name, p) for p in result.marks), (result.preset.name, result.chosen)]:
+        calm = f"{p.calm:.3f}" if p.calm is not None else "-"
+        table.add_row(label, f"{p.ell:.3g}", f"{p.slow_delay:.2f}", f"{p.bandwidth:.2f}", f"{p.noise:.3f}", calm)
+    out.print(table)
+    if result.noise is not None:
+        fit = result.noise
+        gain = fit.found.log_likelihood - fit.start.log_likelihood
+        out.print(
+            f"\nlog likelihood {gain:+.0f} for {fit.found.count} rows"
+            + ("" if fit.converged else "; [yellow]the search did not end by itself[/]")
+        )
+        for r in fit.ratios:
+            said = (
+                f"{r.found:.3g} (times or over {2.718281828**r.spread:.2f})" if r.told else "not told by these drives"
+            )
+            out.print(f"  {r.name:<22} {r.start:.3g} -> {said}")
+    out.print(f"\nat the Q and R of {result.begun.name} the rows are most likely for ell = {result.profile.best:.3g}")
+    if told["result"]:
+        out.print(f"\nwrote {escape(told['result'])}; use it with --preset {escape(told['result'])}")
+    if told["report"]:
+        out.print(f"wrote {escape(told['report'])}")
