@@ -1,9 +1,11 @@
-"""The four estimators of the longitudinal intention: the family `intent`, in order of preference.
+"""The estimators of the longitudinal intention: the family `intent`, in order of preference.
 
 | name          | known input                                   | needs a vehicle |
 |---------------|-----------------------------------------------|-----------------|
 | intent-pedals | pedals, brake pressure, engine torque, gear   | yes             |
 | intent-torque | requested and actual torque, gear             | yes             |
+| intent-fused  | that of intent-pedals; the pedals' rate too   | yes             |
+| intent-fused-torque | that of intent-torque; the request's rate too | yes       |
 | kinematic     | none: the vehicle's own jerk                  | no              |
 | pedals-only   | pedals and gear, no observer                  | yes             |
 
@@ -14,11 +16,12 @@ gives that paper's noise and ell.
 from __future__ import annotations
 
 from codriver.observers import known_input
+from codriver.observers.fused import fused_observer
 from codriver.observers.jerk import jerk_observer
 from codriver.observers.observer import Observer, Output, chain
 from codriver.observers.pedals_only import pedals_only
 from codriver.observers.registry import Design, Estimator, register
-from codriver.observers.scaled_gain import design_scaled_gain
+from codriver.observers.scaled_gain import PRESETS, design_scaled_gain
 from codriver.vehicles import Vehicle
 
 FAMILY = "intent"
@@ -55,6 +58,20 @@ def _intent_torque(vehicle: Vehicle | None, design: Design) -> Observer:
     return _with_observer(known_input.from_torque(vehicle, design.dt), design, INTENTION)
 
 
+def _fused(vehicle: Vehicle | None, design: Design, *, torque: bool) -> Observer:
+    assert vehicle is not None
+    preset = design.preset or PRESETS[DEFAULT_PRESET]
+    return fused_observer(vehicle, design.dt, design.ell, preset, design.form, INTENTION, torque=torque)
+
+
+def _intent_fused(vehicle: Vehicle | None, design: Design) -> Observer:
+    return _fused(vehicle, design, torque=False)
+
+
+def _intent_fused_torque(vehicle: Vehicle | None, design: Design) -> Observer:
+    return _fused(vehicle, design, torque=True)
+
+
 def _kinematic(vehicle: Vehicle | None, design: Design) -> Observer:
     return _with_observer(known_input.kinematic(design.dt), design, MOTION)
 
@@ -75,6 +92,21 @@ register(Estimator(
     ("engine_torque_request", "engine_torque", "gear", "longitudinal_acceleration", "longitudinal_speed"),
     "intentional acceleration and jerk from requested and actual torque, accelerometer and speed (2015)",
     FAMILY, _intent_torque, DEFAULT_PRESET, knob=True,
+))  # fmt: skip
+register(Estimator(
+    "intent-fused", ("mass", "transmission", "pedal_coefficient", "brake_coefficient"),
+    ("accelerator_pedal", "brake_pressure", "engine_torque", "gear", "longitudinal_acceleration", "longitudinal_speed"),
+    "the same as intent-pedals with less lag: the pedals' rate at once, the observer for the rest",
+    FAMILY, _intent_fused, DEFAULT_PRESET, knob=True,
+))  # fmt: skip
+register(Estimator(
+    "intent-fused-torque", ("mass", "transmission", "brake_coefficient"),
+    (
+        "engine_torque_request", "brake_pressure", "engine_torque", "gear", "longitudinal_acceleration",
+        "longitudinal_speed",
+    ),
+    "the same as intent-torque with less lag: the request's rate at once, the observer for the rest",
+    FAMILY, _intent_fused_torque, DEFAULT_PRESET, knob=True,
 ))  # fmt: skip
 register(Estimator(
     "kinematic", (), ("longitudinal_acceleration", "longitudinal_speed"),
