@@ -52,8 +52,8 @@ class CarParameters:
 
 # The car of the 2015 paper. Its section V prints tau = 13, 6.9, 4.3, 3.1, 2.5, and equation 2 says that tau holds 1/r_r. But
 # they are those of the 2017 car, 41, 22, 14, 10, 8 1/m, times a rolling radius of 0.307 to 0.317 m, gear by gear: 1/r_r
-# looks to be left out. With the printed values for 1/m an engine at idle would go 22 km/h in first gear and turn no
-# faster than 90 rad/s at 120 km/h in fifth; so the car simulated here has printed / r_r. The rest is the 2017 car's.
+# looks to be left out. Taken as 1/m, an engine at idle would drive the car at 22 km/h in first gear and at 114 km/h in
+# fifth; so the car simulated here has printed / r_r. The rest is the 2017 car's.
 PRINTED_2015 = (13.0, 6.9, 4.3, 3.1, 2.5)
 ROLLING_RADIUS_2015 = 0.313  # m, the mean of the five quotients
 CAR_2015 = CarParameters(mass=1500.0, transmission=tuple(tau / ROLLING_RADIUS_2015 for tau in PRINTED_2015))
