@@ -1,9 +1,9 @@
 """One drive: road, driver and car together, step by step, recorded.
 
 The motion is integrated in steps of 2 ms (the fastest part, a slipping clutch, has a time constant of about 6 ms);
-the driver decides every 20 ms. Plain floats: a drive of 3 minutes takes well under a second, one of 42 minutes four or
-six. Should that ever be too slow, `Car`, `Powertrain` and `Feet` use only + - * /, comparisons, tanh, a cube
-root and sin, and can be recorded and compiled as the observers are.
+the driver decides every 20 ms. Plain floats: a drive of 3 minutes takes a third of a second, one of 42 minutes four or
+five. Should that ever be too slow, `Car`, `Powertrain` and `Feet` use only + - * /, comparisons, tanh, a cube root and
+sin, and can be recorded and compiled as the observers are.
 """
 
 from __future__ import annotations

@@ -10,10 +10,9 @@ d / (t_k - e_last): the wheel cannot have been quicker, or an edge would have co
 the wheel stands, v_k = 0; the first edge after that is only a beginning.
 
 At constant speed the timer's rounding leaves an error of standard deviation v sqrt(f (1 - f)) delta / (e_last - e_first),
-delta the timer's step and f the fraction of a step left over in n d / v; sqrt(f (1 - f)) is 1 / sqrt(6) in quadratic mean
-over speeds. The value shows the speed of half-way between the two edges, so
-it is late by (t_k - (e_first + e_last) / 2). Teeth are not cut evenly: each stands off by its own share of d, the same at
-every turn.
+delta the timer's step and f the fraction of a step left over in n d / v; over speeds, sqrt(f (1 - f)) is 1 / sqrt(6) in
+quadratic mean. The value is the speed of half-way between the two edges, so it is late by t_k - (e_first + e_last) / 2.
+Teeth are not cut evenly: each stands off by its own share of d, the same at every turn.
 """
 
 from __future__ import annotations
