@@ -36,7 +36,7 @@ def chart_figure(chart: Chart) -> dict[str, Any]:
         "xaxis": {
             "title": {"text": chart.x_label}, "gridcolor": "#e4e4e4", "zeroline": False, "showline": True,
             "linecolor": "#444444", "ticks": "outside", "side": "bottom", "exponentformat": "none",
-            **({"type": "log"} if chart.log_x else {}), **({"type": "category"} if words else {}),
+            **({"type": "log", "dtick": "D2"} if chart.log_x else {}), **({"type": "category"} if words else {}),
         },
     }  # fmt: skip
     if not words and not chart.log_x:
@@ -103,6 +103,7 @@ def _axes(layout: dict[str, Any], plot: Plot, left: str, right: str, domain: lis
     if plot.right_label:
         layout[f"yaxis{right[1:]}"] = common | {
             "title": {"text": plot.right_label, "standoff": 6}, "overlaying": left, "side": "right", "showgrid": False,
+            "tickmode": "auto",
         }  # fmt: skip
 
 
@@ -114,7 +115,7 @@ def _traces(curve: Curve, color: str, axis: str, legend: str) -> list[dict[str, 
     }  # fmt: skip
     x, y = curve.x, curve.y
     if curve.kind in ("points", "bars") or not isinstance(x, np.ndarray):
-        step = -(-y.size // MOST_POINTS) if curve.kind == "points" else 1
+        step = max(1, -(-y.size // MOST_POINTS)) if curve.kind == "points" else 1
         places = _numbers(x[::step]) if isinstance(x, np.ndarray) else list(x)
         shown = base | {"x": places, "y": _numbers(y[::step])}
         if curve.low is not None and curve.high is not None:

@@ -113,8 +113,8 @@ def brake_document(fit: BrakeFit, old: Vehicle, command: str = "") -> Document:
                 "Without a known bias, kappa_1 cannot be told from the accelerometer's bias d_a: what is found is kappa_1 - M d_a. "
                 "gamma is how much more acceleration the sensor shows than the wheels, mostly the pitch of the body.",
             )),
-            Section("Measured and modelled acceleration", (_figure_1(fit),)),
-            Section("How much data it takes", _figure_2(fit)),
+            Section("Measured and modelled acceleration", (validation_chart(fit),)),
+            Section("How much data it takes", learning_chart(fit)),
             Section("How sure", (
                 _correlation(fit),
                 f"Neighbouring residuals are alike, so they count for less than their number. Standard errors come from drawing "
@@ -147,7 +147,7 @@ def pedal_document(fit: PedalFit, old: Vehicle | None, command: str = "") -> Doc
                     ("a constant", f"{fit.rmse_constant:.2f}"),
                 )),
             )),
-            Section("Requested torque over pedal", (_figure_3(fit),)),
+            Section("Requested torque over pedal", (pedal_chart(fit),)),
             Section("What was used", (_masks(fit.share, fit.used_share, PEDAL_REASONS),)),
         ),
         (("recordings", ", ".join(fit.sources)), ("fitted on", f"{fit.minutes_fit:.1f} min"),
@@ -194,7 +194,7 @@ def _efficiency(share: float) -> Mark:
     return Mark("good" if 0.8 <= share <= 1.02 else "bad", f"{share:.2f}")
 
 
-def _figure_1(fit: BrakeFit) -> Chart:
+def validation_chart(fit: BrakeFit) -> Chart:
     """[y1]_F and a_ID over the stretch of the validation half that brakes most."""
     rows = fit.rows
     n = min(round(STRETCH / rows.dt), rows.time.size)
@@ -224,7 +224,7 @@ def _figure_1(fit: BrakeFit) -> Chart:
     )  # fmt: skip
 
 
-def _figure_2(fit: BrakeFit) -> tuple[Chart | str, ...]:
+def learning_chart(fit: BrakeFit) -> tuple[Chart | str, ...]:
     """Coefficient and validation error against minutes."""
     points = [p for p in fit.curve if np.isfinite(p.value)]
     c_b = fit.coefficients.get("c_b")
@@ -249,7 +249,7 @@ def _figure_2(fit: BrakeFit) -> tuple[Chart | str, ...]:
     ),)  # fmt: skip
 
 
-def _figure_3(fit: PedalFit) -> Chart:
+def pedal_chart(fit: PedalFit) -> Chart:
     """Request over pedal, with the line."""
     rows = np.flatnonzero(fit.fitted | fit.validated)
     rows = rows[:: max(rows.size // MOST_POINTS, 1)]

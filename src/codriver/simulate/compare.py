@@ -4,7 +4,8 @@ Root mean square errors of the jerk, each beside that of always answering zero:
 
     moment   against the truth of the moment; a lag counts as error
     matched  against the same observer fed ideal signals of the truth (`judge.delay_matched`); the lag is taken out
-    shifts   `matched`, in gear shifts and the second after each, in which the observer still answers to it
+    shifts   `matched`, inside gear shifts
+    around   `matched`, inside gear shifts and in the second after each, in which the observer still answers to it
 
 and the best correlation with the truth over lags from 0 to 2 s, with the lag where it is reached. Each against two truths:
 the intention as the model defines it ("model"), and the driver's plan ("plan"), which knows nothing of gears and pedals. All
@@ -49,7 +50,8 @@ class Score:
         moment, zero: error against the truth of the moment, and that of answering zero.
         correlation, lag: the best correlation with the truth, and the lag where it is reached, s.
         matched, matched_zero: with the lag taken out, and that of answering zero; None without an observer.
-        shifts, shifts_zero: the same in gear shifts.
+        shifts, shifts_zero: the same inside gear shifts.
+        around, around_zero: the same inside gear shifts and in the second after each.
     """
 
     estimator: str
@@ -63,6 +65,8 @@ class Score:
     matched_zero: float | None = None
     shifts: float | None = None
     shifts_zero: float | None = None
+    around: float | None = None
+    around_zero: float | None = None
 
 
 def run_estimators(
@@ -99,7 +103,7 @@ def compare(estimates: Mapping[tuple[str, float | None], Estimate], truth: Log) 
     """Judge estimates of `run_estimators` against a truth (`truth_log`)."""
     first = next(iter(estimates.values()))
     use = np.logical_and.reduce([estimate.valid for estimate in estimates.values()])
-    in_shift = use & shifting(truth, first.time)
+    inside, around = (use & shifting(truth, first.time, after) for after in (0.0, AFTER))
     scores = []
     for of, (acceleration, jerk) in TRUTHS.items():
         moment = at(truth, jerk, first.time)
@@ -114,7 +118,7 @@ def compare(estimates: Mapping[tuple[str, float | None], Estimate], truth: Log) 
                 wanted = matched[ell]
                 score = Score(
                     name, ell, of, score.moment, score.zero, correlation, lag,
-                    rms((ours - wanted)[use]), rms(wanted[use]), rms((ours - wanted)[in_shift]), rms(wanted[in_shift]),
+                    *(f for part in (use, inside, around) for f in (rms((ours - wanted)[part]), rms(wanted[part]))),
                 )  # fmt: skip
             scores.append(score)
     return scores
@@ -126,13 +130,14 @@ def jerk_of(estimate: Estimate) -> Array:
     return estimate.columns[name]
 
 
-def shifting(truth: Log, time: Array) -> Flags:
-    """Where a gear shift goes on or was over less than AFTER seconds ago; at times (s, shape (n,))."""
+def shifting(truth: Log, time: Array, after: float = AFTER) -> Flags:
+    """Where a gear shift goes on or was over less than `after` seconds ago; at times (s, shape (n,))."""
     active = truth["shift"].time[truth["shift"].values != 0]
     if not active.size:
         return np.zeros(time.size, bool)
     newest = np.searchsorted(active, time, side="right") - 1
-    return np.asarray((newest >= 0) & (time - active[np.maximum(newest, 0)] < AFTER))
+    # A sample of the truth stands for the hundredth of a second after it.
+    return np.asarray((newest >= 0) & (time - active[np.maximum(newest, 0)] < max(after, 0.01)))
 
 
 def best_lag(estimate: Array, truth: Array, use: Flags, dt: float) -> tuple[float, float]:

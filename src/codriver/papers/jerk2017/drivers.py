@@ -1,0 +1,204 @@
+"""2017 section IV-D: six drivers on the same road, over the curvilinear coordinate (figure 7)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+
+import numpy as np
+
+from codriver.estimate import Estimate
+from codriver.papers.drawing import slope_percent, window_in
+from codriver.papers.drives import Driven
+from codriver.papers.item import Item
+from codriver.papers.jerk2017.performance import BOXES, bursts, in_order
+from codriver.papers.reproduction import Chapter
+from codriver.report.document import BLACK, COLORS, Chart, Curve, Plot, Table
+from codriver.report.shown import shown
+from codriver.signals.signal import Array
+from codriver.simulate import ROAD_TEST_STRETCHES
+from codriver.simulate.compare import rms
+from codriver.simulate.judge import at
+
+STEP = 1.0  # m along the road
+_LETTING_GO = -0.4  # m/s^2: intentional acceleration below which a driver has begun to slow down
+_BEFORE = 250.0  # m before a line in which that is looked for
+
+
+def drivers_chapter(drives: Mapping[str, Driven], estimates: Mapping[str, Estimate]) -> Chapter:
+    """Figure 7: all drivers with the same observer, ell = 2; in the paper's order."""
+    place = ROAD_TEST_STRETCHES["comparison"]
+    s = np.arange(place.start, place.stop, STEP)
+    found = {name: _Along(drives[name], estimates[name], s) for name in drives}
+    names = list(found)
+    words = (
+        "The same observer with the same noise and ell = 2 for every driver. The six are made up, in the paper's order: "
+        f"{', '.join(f'{i} {name}' for i, name in enumerate(names, 1))}. s is the true distance along the road; a log without "
+        "position would take the integral of the speed.",
+    )
+    charts = tuple(
+        _chart(f"Figure 7, drivers {first + 1} to {first + len(group)}", {n: found[n] for n in group}, s, first)
+        for first, group in ((i, names[i : i + 3]) for i in range(0, len(names), 3))
+    )
+    return Chapter("Comparison of drivers (IV-D)", words, (_table(found, estimates), *charts, _jerks(found, s)),
+                   (*_slopes(found), *_boxes(drives, estimates), *_styles(found, estimates, drives)))  # fmt: skip
+
+
+class _Along:
+    """One driver's signals over the distance, in display units."""
+
+    def __init__(self, driven: Driven, estimate: Estimate, s: Array) -> None:
+        part = window_in(estimate, driven.truth, float(s[0]), float(s[-1]))
+        time = part(estimate.time)
+        distance = at(driven.truth, "distance", time)
+        valid = part(estimate.valid)
+
+        def over(name: str, values: Array) -> Array:
+            return np.asarray(np.interp(s, distance, shown(name, np.where(valid, values, np.nan))))
+
+        self.speed = over("longitudinal_speed", part(estimate.columns["longitudinal_speed"]))
+        self.acceleration = over("intentional_acceleration", part(estimate.columns["intentional_acceleration"]))
+        self.jerk = over("intentional_jerk", part(estimate.columns["intentional_jerk"]))
+        self.slope = slope_percent(over("acceleration_offset", part(estimate.columns["acceleration_offset"])))
+        self.pedal = np.interp(s, distance, shown("accelerator_pedal", part(estimate.grid.values["accelerator_pedal"])))
+        self.brake = np.interp(s, distance, shown("brake_pressure", part(estimate.grid.values["brake_pressure"])))
+        self.true_slope = 100 * np.tan(np.interp(s, distance, at(driven.truth, "road_slope", time)))
+
+
+def _chart(title: str, group: Mapping[str, _Along], s: Array, first: int) -> Chart:
+    """The upper plots of figure 7 for some of the drivers."""
+    colors = [COLORS[(first + i) % len(COLORS)] for i in range(len(group))]
+
+    def lines(attribute: str, names: bool = False) -> tuple[Curve, ...]:
+        return tuple(
+            Curve(name if names else "", s, getattr(along, attribute), color)
+            for (name, along), color in zip(group.items(), colors, strict=True)
+        )
+
+    true = Curve("true", s, next(iter(group.values())).true_slope, BLACK, dash="dot", width=1.2)
+    return Chart(
+        title, "distance s (m)",
+        (
+            Plot("speed (km/h)", lines("speed", True), 130), Plot("accelerator (%)", lines("pedal"), 110),
+            Plot("brake (bar)", lines("brake"), 110), Plot("intent. acc. (m/s²)", lines("acceleration"), 150, (0.0,)),
+            Plot("slope (%)", (*lines("slope"), true), 130, (0.0,)),
+        ),
+        boxes=_frames(),
+    )  # fmt: skip
+
+
+def _jerks(found: Mapping[str, _Along], s: Array) -> Chart:
+    """The lower plots: one jerk for each driver."""
+    top = max(float(np.nanmax(np.abs(along.jerk))) for along in found.values())
+    plots = tuple(
+        Plot(
+            "jerk (m/s³)",
+            (Curve(f"{i} {name}", s, along.jerk, COLORS[(i - 1) % len(COLORS)]),),
+            90,
+            (0.0,),
+            limits=(-top, top),
+        )
+        for i, (name, along) in enumerate(found.items(), 1)
+    )
+    return Chart("Figure 7, intentional jerk of each driver", "distance s (m)", plots,
+                 "Boxes as in figure 4. All plots have the same scale.", boxes=_frames())  # fmt: skip
+
+
+def _frames() -> tuple[tuple[float, float, str], ...]:
+    return tuple((ROAD_TEST_STRETCHES[n].start, ROAD_TEST_STRETCHES[n].stop, str(i)) for i, n in enumerate(BOXES, 1))
+
+
+def _slopes(found: Mapping[str, _Along]) -> tuple[Item, ...]:
+    """The slope of several drivers over s: do they agree, and with the truth?"""
+    both = [np.isfinite(along.slope) for along in found.values()]
+    use = np.logical_and.reduce(both)
+    slopes = [along.slope[use] for along in found.values()]
+    pairs = list(combinations(slopes, 2))
+    apart = float(np.mean([rms(a - b) for a, b in pairs])) if pairs else 0.0
+    alike = float(np.min([np.corrcoef(a, b)[0, 1] for a, b in pairs])) if pairs else 1.0
+    true = next(iter(found.values())).true_slope[use]
+    off = float(np.mean([rms(a - np.mean(a) - true + np.mean(true)) for a in slopes]))
+    return (
+        Item("fig. 7: the estimated slope coincides significantly for the drivers", "significantly", alike, "1", alike > 0.8,
+             f"smallest correlation of two drivers' slopes over s; mean rms difference {apart:.2f} % of slope; above 0.8 counts"),
+        Item("fig. 7: error of the slope", None, off, "% slope", off < 1.0,
+             f"rms against the true slope, the accelerometer's bias taken out; the slope itself spans {np.ptp(true):.1f} %"),
+    )  # fmt: skip
+
+
+def _boxes(drives: Mapping[str, Driven], estimates: Mapping[str, Estimate]) -> tuple[Item, ...]:
+    """What the paper sees in the boxes."""
+    claims = (
+        ("ramp", (-1, 1), "all drivers first decelerate, then accelerate", len(drives)),
+        ("bend", (-1,), "all drivers show a negative burst", len(drives)),
+        ("roundabout", (-1, 1), "a negative burst, then positive ones: second, third, fifth and sixth driver", 4),
+    )
+    items = []
+    for name, signs, claim, least in claims:
+        shows = {d: in_order(bursts(drives[d], estimates[d], name), signs) for d in drives}
+        count = sum(shows.values())
+        number = BOXES.index(name) + 1
+        items.append(Item(f"fig. 7, box {number}: {claim}", f"at least {least} drivers", f"{count} of {len(drives)}", "",
+                          count >= min(least, len(drives)), "bursts of the estimated jerk: " + ", ".join(
+                              f"{d} {'yes' if shown_ else 'no'}" for d, shown_ in shows.items())))  # fmt: skip
+    items.append(Item("fig. 7, box 3: peculiar to the sixth driver", "sixth only", "all", "", None,
+                      "here the other car comes out before every driver, so that they can be compared"))  # fmt: skip
+    return tuple(items)
+
+
+def _styles(
+    found: Mapping[str, _Along], estimates: Mapping[str, Estimate], drives: Mapping[str, Driven]
+) -> tuple[Item, ...]:  # fmt: skip
+    """Who drives how, over the whole drive; and who anticipates."""
+    jerk = {name: rms(e.columns["intentional_jerk"][e.valid]) for name, e in estimates.items()}
+    order = sorted(jerk, key=lambda name: -jerk[name])
+    said = ", ".join(f"{name} {jerk[name]:.2f}" for name in order)
+    names = list(found)
+    items = []
+    if len(names) == 6:
+        first, second, third, fourth, fifth, sixth = names
+        items = [
+            Item("fig. 7: the first and partly the fourth driver are aggressive", "first, fourth", f"{order[0]}, {order[1]}", "",
+                 {order[0], order[1]} == {first, fourth}, f"largest rms of the intentional jerk over the drive (m/s³): {said}"),
+            Item("fig. 7: the fifth driver is the smoothest", "fifth", order[-1], "", order[-1] == fifth,
+                 "smallest rms of the intentional jerk"),
+            Item("fig. 7: the third and sixth driver lie between", "between",
+                 f"{order.index(third) + 1} and {order.index(sixth) + 1} of 6", "",
+                 all(jerk[fifth] < jerk[n] < jerk[first] for n in (third, sixth)), "rank by rms of the intentional jerk"),
+        ]  # fmt: skip
+        for line, number in ((27_000.0, 1), (28_900.0, 4)):
+            ahead = {n: _anticipation(drives[n], estimates[n], line) for n in names}
+            earliest = max(ahead, key=lambda n: ahead[n])
+            items.append(Item(
+                f"fig. 7, box {number}: the second driver anticipates the deceleration most", "second", earliest, "",
+                earliest == second, "distance before the line where the intentional acceleration first falls below "
+                f"{_LETTING_GO:g} m/s²: " + ", ".join(f"{n} {d:.0f} m" for n, d in ahead.items()),
+            ))  # fmt: skip
+    return tuple(items)
+
+
+def _anticipation(driven: Driven, estimate: Estimate, line: float) -> float:
+    """How far before a line (m) a driver has begun to slow down for it, m; 0 if he has not."""
+    part = window_in(estimate, driven.truth, line - _BEFORE, line)
+    distance = at(driven.truth, "distance", part(estimate.time))
+    slowing = part(estimate.columns["intentional_acceleration"]) < _LETTING_GO
+    # The last time it began, so that an earlier bend does not count.
+    starts = np.flatnonzero(np.diff(slowing.astype(np.int8), prepend=0) == 1)
+    lasting = [k for k in starts if slowing[k : k + 100].mean() > 0.8]
+    return float(line - distance[lasting[0]]) if lasting else 0.0
+
+
+def _table(found: Mapping[str, _Along], estimates: Mapping[str, Estimate]) -> Table:
+    rows: list[tuple[str | float, ...]] = []
+    for number, (name, estimate) in enumerate(estimates.items(), 1):
+        jerk = estimate.columns["intentional_jerk"][estimate.valid]
+        a_i = estimate.columns["intentional_acceleration"][estimate.valid]
+        pedal = estimate.grid.values["accelerator_pedal"]
+        rows.append((
+            f"{number} {name}", rms(jerk), *(float(q) for q in np.percentile(jerk, (1, 99))), rms(a_i),
+            100 * rms(np.diff(pedal[np.isfinite(pedal)])) / estimate.grid.dt, float(estimate.time[-1]) / 60,
+        ))  # fmt: skip
+    return Table(
+        ("driver", "jerk, rms m/s³", "1 %", "99 %", "acceleration, rms m/s²", "pedal rate, rms %/s", "drive, min"), tuple(rows),
+        "Over the whole drive.",
+    )  # fmt: skip
