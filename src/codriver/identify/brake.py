@@ -34,6 +34,8 @@ from codriver.vehicles import Vehicle
 BRAKE_SD, DRAG_SD, GAIN_SD, OFFSET_SD = 0.1, 0.25, 0.02, 0.05  # share, share, absolute, m/s^2
 LEAST_FREEDOM = 4
 ODD_GAIN = 0.06  # gamma beyond it is no pitch: mass, tau or a sensor's scale
+# What counts as no signal at all: m/s^2, m^2/s^2, Pa, RMS.
+_NOTHING = {"gamma": 1e-4, "kappa_2": 1e-3, "c_b": 1.0}
 PARAMETERS = {"c_b": "brake_coefficient", "kappa_1": "rolling_resistance", "kappa_2": "drag"}
 
 
@@ -266,14 +268,16 @@ def _told_apart(X: Array, names: list[str]) -> tuple[str, str] | None:
             continue
         k = names.index(name)
         others = np.delete(X, k, axis=1)
-        try:
-            rest = X[:, k] - others @ solve(others, X[:, k])
-        except LogError:
-            continue
-        if not _rms(rest) > 1e-5 * _rms(X[:, k]):
+        size, rest = _rms(X[:, k]), 0.0
+        if size > _NOTHING[name]:
+            try:
+                rest = _rms(X[:, k] - others @ solve(others, X[:, k]))
+            except LogError:
+                continue  # one of the others is at fault
+        if not rest > 1e-5 * size:
             reason = {
                 "kappa_2": "one speed: v^2 does not vary, so drag and kappa_1 cannot be told apart",
-                "gamma": "the acceleration does not vary, or follows the brake alone",
+                "gamma": "the acceleration does not vary, or follows the other columns",
                 "c_b": "the brake pressure does not vary",
             }[name]
             return name, reason

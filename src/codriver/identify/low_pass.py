@@ -8,7 +8,8 @@ On ticks of dt seconds a signal is held (`codriver.signals.sampler`), and for a 
 
 The same filter for all keeps an equation that is linear in them true, its lag included. What it does not take away is the
 hold itself, which delays a signal by half of its own sample interval on average: 5 ms at 100 Hz, 50 ms at 10 Hz. So the
-stamps of a measured signal are set back by half an interval first (`centred`). A latency in the sensor or on the bus stays.
+stamps of a measured signal are set back by half an interval first (`centred`), after which holds differ by half a tick at
+most. A latency in the sensor or on the bus stays.
 """
 
 from __future__ import annotations
@@ -57,7 +58,8 @@ def rate(x: Array, dt: float) -> Array:
     delay between other signals: 5 ms would change a coefficient of the rate by 0.03.
     """
     slow = low_pass(x, dt)
-    return _backwards(2 * pi * RATE_PASS * (slow - low_pass(slow, dt, RATE_PASS)), dt)
+    per_second = (1 - exp(-2 * pi * RATE_PASS * dt)) / dt  # makes the rate of a ramp exact
+    return _backwards(per_second * (slow - low_pass(slow, dt, RATE_PASS)), dt)
 
 
 def _backwards(x: Array, dt: float) -> Array:

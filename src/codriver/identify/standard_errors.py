@@ -6,8 +6,9 @@ With rows x_k, residuals e_k, scores u_k = x_k e_k (0 where a row is not used) a
                = A^-1 (1 / L sum_k m_k m_k') A^-1,   m_k = u_k + ... + u_{k+L-1}
 
 The second line is the same sum, in one pass. The block bootstrap needs no formula: blocks of L ticks are drawn with
-replacement, each from its own log, and the fit is repeated. L comes from the residuals: with n rows and c ticks over which
-they are alike (c = 1 + 2 sum of the autocorrelation, up to its first value below 0.05),
+replacement, each from its own log, and the fit is repeated. L comes from the data: a coefficient's error is the sum of
+A^-1 u_k over the rows, so what counts is over how many ticks c the entries of A^-1 u_k are alike (c = 1 + 2 sum of the
+autocorrelation, up to its first value below 0.05; the greatest of all coefficients and of e_k itself). With n rows
 
     L = c (n / c)^(1/3)
 
@@ -55,13 +56,17 @@ def autocorrelation(e: Array, used: Flags, pieces: Index, most: int) -> Array:
     return np.asarray(covariance / covariance[0]) if covariance[0] > 0 else np.zeros(most + 1)
 
 
-def block_length(e: Array, used: Flags, pieces: Index) -> int:
+def block_length(X: Array, e: Array, used: Flags, pieces: Index) -> int:
     """L, ticks: see the module's docstring."""
     longest = int(np.diff(pieces).max())
-    rho = autocorrelation(e, used, pieces, max(min(round(LONGEST * longest), 20_000), 1))
-    below = np.flatnonzero(rho[1:] < LEAST_ALIKE)
-    first = int(below[0]) + 1 if below.size else rho.size
-    alike = 1.0 + 2.0 * float(rho[1:first].sum())
+    most = max(min(round(LONGEST * longest), 20_000), 1)
+    influence = X @ np.linalg.inv(X[used].T @ X[used]) * e[:, None]
+    alike = 1.0
+    for series in (e, *influence.T):
+        rho = autocorrelation(series, used, pieces, most)
+        below = np.flatnonzero(rho[1:] < LEAST_ALIKE)
+        first = int(below[0]) + 1 if below.size else rho.size
+        alike = max(alike, 1.0 + 2.0 * float(rho[1:first].sum()))
     return max(round(alike * (max(float(used.sum()) / alike, 1.0)) ** (1 / 3)), 1)
 
 
