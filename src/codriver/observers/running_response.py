@@ -20,12 +20,11 @@ import numpy as np
 
 from codriver.errors import UsageError
 from codriver.models import intention_model
+from codriver.observers.riccati import stationary_predicted, tick_map
 from codriver.observers.scaled_gain import ScaledGain
 from codriver.signals.signal import Array
 
 _JERK = 3
-_CLOSE = 1e-10  # relative change of P over a period at which it is taken as settled
-_MOST_PERIODS = 100_000
 
 
 @dataclass(frozen=True)
@@ -88,18 +87,16 @@ def running_response(design: ScaledGain, every: tuple[int, int] = (1, 1)) -> Run
 
 def _periodic_gains(design: ScaledGain, every: tuple[int, int]) -> list[Array]:
     """The gain of each tick of a period, shape (4, 2) each, 0 where a row does not come."""
-    C, period, P = intention_model().C, lcm(*every), design.P
-    for _ in range(_MOST_PERIODS):
-        before, gains = P, []
-        for k in range(period):
-            here = [row for row in (0, 1) if k % every[row] == 0]
-            predicted, K = design.F @ P @ design.F.T + design.Qd, np.zeros((4, 2))
-            if here:
-                H, R = C[here], design.Rd[np.ix_(here, here)]
-                K[:, here] = np.linalg.solve(H @ predicted @ H.T + R, H @ predicted).T
-            left = np.eye(4) - K @ C
-            P = left @ predicted @ left.T + K @ design.Rd @ K.T
-            gains.append(K)
-        if np.max(np.abs(P - before)) <= _CLOSE * np.max(np.abs(P)):
-            break
+    C, R, eye = intention_model().C, np.diag(design.Rd), np.eye(4)
+    rows = [[row for row in (0, 1) if k % every[row] == 0] for k in range(lcm(*every))]
+    predicted = stationary_predicted([tick_map(design.F, design.Qd, C[here], R[here]) for here in rows])
+    gains = []
+    for here in rows:
+        H, K = C[here], np.zeros((4, 2))
+        if here:
+            K[:, here] = np.linalg.solve(H @ predicted @ H.T + np.diag(R[here]), H @ predicted).T
+        left = eye - K @ C
+        P = left @ predicted @ left.T + K @ design.Rd @ K.T
+        predicted = design.F @ P @ design.F.T + design.Qd
+        gains.append(K)
     return gains

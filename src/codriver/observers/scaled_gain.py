@@ -111,15 +111,20 @@ def design_scaled_gain(preset: Preset | str, dt: float, ell: float | None = None
     Q0, R0 = np.diag(preset.Q), np.diag(preset.R)
     P0 = solve_continuous_are(A.T, C.T, Q0, R0)
     L_K = P0 @ C.T @ np.linalg.inv(R0)
-    T, right = np.diag([1.0, ell, ell, ell**2]), np.diag([1.0, ell])
-    L = T @ L_K @ right
-    Q, R = T @ Q0 @ T, np.linalg.inv(right) @ R0 @ np.linalg.inv(right)
+    L = np.diag([1.0, ell, ell, ell**2]) @ L_K @ np.diag([1.0, ell])
+    Q, R = scaled_noise(preset, ell)
     F, Qd, Rd = model.transition(dt), model.process_noise(Q, dt), R / dt
     predicted = solve_discrete_are(F.T, C.T, Qd, Rd)
     K = predicted @ C.T @ np.linalg.inv(C @ predicted @ C.T + Rd)
     left = np.eye(4) - K @ C
     P = left @ predicted @ left.T + K @ Rd @ K.T  # Joseph's form keeps it positive definite
     return ScaledGain(ell, dt, L_K, L, Q, R, F, Qd, Rd, K, P, predicted, _certify(A, C, F, L_K, L, K, ell, dt))
+
+
+def scaled_noise(preset: Preset, ell: float) -> tuple[Array, Array]:
+    """Q_ell, shape (4, 4), and R_ell, shape (2, 2)."""
+    T, left = np.diag([1.0, ell, ell, ell**2]), np.diag([1.0, 1.0 / ell])
+    return T @ np.diag(preset.Q) @ T, left @ np.diag(preset.R) @ left
 
 
 def check_tick(dt: float) -> None:

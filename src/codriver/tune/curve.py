@@ -23,7 +23,7 @@ from codriver.observers.running_response import running_response
 from codriver.observers.scaled_gain import Preset, design_scaled_gain
 from codriver.signals.signal import Array
 
-ELLS = tuple(float(x) for x in np.geomspace(0.5, 8.0, 17))
+ELLS = tuple(float(x) for x in np.geomspace(0.5, 8.0, 9))
 WINDOW, LEAD = 5.0, 2.0  # s
 STILL = 0.02  # of a signal's range in the drive
 FEWEST_WINDOWS = 3

@@ -25,11 +25,13 @@ import numpy.typing as npt
 from codriver.errors import DesignError, LogError
 from codriver.estimate import Estimate
 from codriver.kernel import Scalar, negate, select
+from codriver.models import intention_model
 from codriver.observers.covariance import predict_mean
 from codriver.observers.jerk import SLOW
 from codriver.observers.jerk_forms import ROWS, STATES, Situation, kalman_update
 from codriver.observers.observer import Observer, Output, Scalars
-from codriver.observers.scaled_gain import Preset, ScaledGain, design_scaled_gain
+from codriver.observers.riccati import stationary_predicted, tick_map
+from codriver.observers.scaled_gain import Preset, scaled_noise
 from codriver.program import compile
 from codriver.signals import Grid
 from codriver.signals.signal import Array
@@ -118,8 +120,7 @@ class Likelihood:
 
     def _terms(self, preset: Preset, ell: float) -> list[tuple[Array, Array]]:
         """e^2 / s and log s of the rows that count, for each drive."""
-        design = design_scaled_gain(preset, self.dt, ell)
-        carry = {**dict.fromkeys(_STATE, 0.0), **_noise_of(design)}
+        carry = {**dict.fromkeys(_STATE, 0.0), **_noise_of(preset, ell, self.dt)}
         found = []
         for grid, counted in zip(self._drives, self._counted, strict=True):
             _, columns = self._program.advance(grid, carry)
@@ -172,17 +173,26 @@ def _soon_after(flag: npt.NDArray[np.bool_], seconds: float, dt: float) -> npt.N
     return np.asarray(np.arange(flag.size) - last <= seconds / dt)
 
 
-def _noise_of(design: ScaledGain) -> dict[str, float]:
-    """The carried scalars that hold a noise."""
-    values = [
-        *(design.Qd[i, j] for i, j in _PAIRS), design.Rd[0, 0], design.Rd[1, 1], *(design.P[i, i] for i in range(4)),
-    ]  # fmt: skip
+def _noise_of(preset: Preset, ell: float, dt: float) -> dict[str, float]:
+    """The carried scalars that hold a noise: what `design_scaled_gain` says of it, without its proofs."""
+    model = intention_model()
+    Q, R = scaled_noise(preset, ell)
+    F, Qd, Rd = model.transition(dt), model.process_noise(Q, dt), np.diag(R) / dt
+    predicted = stationary_predicted([tick_map(F, Qd, model.C, Rd)])
+    S = model.C @ predicted @ model.C.T + np.diag(Rd)
+    P = predicted - predicted @ model.C.T @ np.linalg.solve(S, model.C @ predicted)
+    if not np.all(np.diag(P) > 0):
+        raise DesignError(
+            f"Q = {preset.Q}, R = {preset.R} at ell = {ell:g} leave a state without variance",
+            "a noise whose filter keeps its digits", "choose less extreme ratios of Q and R",
+        )  # fmt: skip
+    values = [*(Qd[i, j] for i, j in _PAIRS), *Rd, *np.diag(P)]
     return dict(zip(_NOISE, (float(value) for value in values), strict=True))
 
 
 def _recursion(dt: float) -> Observer:
     """The Kalman form's recursion with its noise among the carried scalars, which it leaves as they are."""
-    F = design_scaled_gain("bisoffi2017", dt).F  # the same for every noise
+    F = intention_model().transition(dt)
 
     def step(carry: Scalars, u: Scalars, y: Scalars, ok: Scalars, rho: Scalars) -> tuple[Scalars, Scalars]:
         x = predict_mean([carry[f"x_{state}"] for state in STATES], F)
