@@ -45,7 +45,7 @@ class RiccatiMap:
         return RiccatiMap(self.A @ W_A, (G + G.T) / 2, (H + H.T) / 2)
 
 
-def tick_map(F: Array, Qd: Array, C: Array, noise: Sequence[float]) -> RiccatiMap:
+def tick_map(F: Array, Qd: Array, C: Array, noise: Sequence[float] | Array) -> RiccatiMap:
     """The map of one tick.
 
     Args:
