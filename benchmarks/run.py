@@ -20,7 +20,7 @@ from pathlib import Path
 
 from measure import Row, duration, say
 
-NAMES = ("start", "kernel", "live", "batch", "limits", "decode", "end_to_end", "memory")
+NAMES = ("start", "kernel", "live", "batch", "smoother", "limits", "decode", "end_to_end", "memory", "identification")
 LIBRARIES = (
     "codriver", "numpy", "scipy", "casadi", "llvmlite", "pyarrow", "cantools", "python-can", "asammdf", "pandas", "filterpy",
     "statsmodels", "numba",
