@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from codriver.errors import UsageError
 from codriver.estimate import Estimate
 from codriver.names import VOCABULARY
 from codriver.observers import build, design_scaled_gain
@@ -54,6 +55,9 @@ def judge(estimate: Estimate, truth: Log) -> list[Judgement]:
         estimate: of intent-pedals or intent-torque.
         truth: with intentional_acceleration, intentional_jerk, planned_jerk, longitudinal_speed,
             longitudinal_acceleration (dv/dt), acceleration_offset and known_input.
+
+    Raises:
+        UsageError: see `delay_matched`.
     """
     settings = estimate.provenance
     ell, dt, preset = float(settings["ell"]), estimate.grid.dt, preset_of(settings)
@@ -87,8 +91,17 @@ def delay_matched(estimate: Estimate, truth: Log, intention: str) -> Estimate:
     """The observer's answer to ideal signals whose intention is the truth's signal `intention`, on the estimate's ticks.
 
     The ideal signals are v and v' + o_a, at the stamps that the estimate's log has for them, and u = v' - intention.
+
+    Raises:
+        UsageError: the estimate is one of intent-fused, whose lag follows the noise of the pedals; ideal signals have none.
     """
     settings = estimate.provenance
+    if "rest_ell" in settings:
+        raise UsageError(
+            f"an estimate of {settings['estimator']}, which is quicker the less noise its pedals have",
+            "an estimate of intent-pedals or intent-torque, for no ideal signals lag as the fused one does",
+            "judge it by its best correlation with the truth and the lag of that, as docs/fused.md does",
+        )
     stamps = {name: estimate.log[name].time for name in ("longitudinal_speed", "longitudinal_acceleration")}
     made = {name: at(truth, name, time) for name, time in stamps.items()}
     made["longitudinal_acceleration"] += at(truth, "acceleration_offset", stamps["longitudinal_acceleration"])
