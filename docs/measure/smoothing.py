@@ -88,8 +88,9 @@ def main(*styles: str) -> None:
         "valid",
     ]
     print(table(head, rows))
+    minutes = len(time) * dt / 60
     print(
-        f"\none smoothing of a whole drive of {len(time) * dt / 60:.0f} minutes: {min(took):.2f} to {max(took):.2f} s, reading left out"
+        f"\none smoothing of a drive of {minutes:.0f} minutes: {min(took):.2f} to {max(took):.2f} s, reading left out"
     )
 
 

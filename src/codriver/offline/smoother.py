@@ -26,7 +26,8 @@ import numpy as np
 
 from codriver.errors import UsageError
 from codriver.estimate import Estimate
-from codriver.observers import ScaledGain, build, design_scaled_gain, preset_of
+from codriver.models import intention_model
+from codriver.observers import build
 from codriver.observers.feed import suggest_rate
 from codriver.observers.jerk import SLOW
 from codriver.observers.jerk_forms import SETTLED, STATES
@@ -88,18 +89,18 @@ def smooth(
     if isinstance(vehicle, (str, Path)):
         vehicle = load_vehicle(vehicle)
     name, _ = choose(estimator, log, vehicle)
-    probe = build(name, vehicle, ell=ell, preset=preset)
-    if [key for key in probe.carry if key in _MEANS or key in _COVARIANCES] != [*_MEANS, *_COVARIANCES] or (
-        sum(key.startswith("x_") for key in probe.carry) != len(_MEANS)
+    observer = build(name, vehicle, dt=dt if dt is not None else 0.01, ell=ell, preset=preset)
+    if [key for key in observer.carry if key in _MEANS or key in _COVARIANCES] != [*_MEANS, *_COVARIANCES] or (
+        sum(key.startswith("x_") for key in observer.carry) != len(_MEANS)
     ):
         raise UsageError(
             f"{name} cannot be smoothed: it has no Kalman filter of {', '.join(STATES)}",
             "intent-pedals, intent-torque or kinematic", "choose one of these",
         )  # fmt: skip
-    tick = dt if dt is not None else 1.0 / suggest_rate(log, probe.measured)
-    observer = build(name, vehicle, dt=tick, ell=ell, preset=preset)
-    design = design_scaled_gain(preset_of(_texts(observer)), tick, float(observer.settings["ell"]))
-    return _smoothed(compile(_with_memory(observer)).run(log), observer, design, lag)
+    tick = dt if dt is not None else 1.0 / suggest_rate(log, observer.measured)
+    if tick != observer.dt:
+        observer = build(name, vehicle, dt=tick, ell=ell, preset=preset)
+    return _smoothed(compile(_with_memory(observer)).run(log), observer, lag)
 
 
 def _with_memory(observer: Observer) -> Observer:
@@ -113,7 +114,7 @@ def _with_memory(observer: Observer) -> Observer:
     return replace(observer, outputs=(*observer.outputs, *(Output(name, "", "input") for name in shown)), step=step)
 
 
-def _smoothed(run: Estimate, observer: Observer, design: ScaledGain, lag: float | None) -> SmoothedEstimate:
+def _smoothed(run: Estimate, observer: Observer, lag: float | None) -> SmoothedEstimate:
     """The smoothed estimate, from the filter's run with its memory shown."""
     columns, n, dt = dict(run.columns), len(run.grid), run.grid.dt
     memory = {name: columns.pop(name) for name in (*_MEANS, *_COVARIANCES)}
@@ -127,7 +128,8 @@ def _smoothed(run: Estimate, observer: Observer, design: ScaledGain, lag: float 
 
     ticks = n if lag is None else round(lag / dt)
     if ticks:
-        model = design.F, design.Qd, dt
+        plant = intention_model()
+        model = plant.transition(dt), plant.process_noise(observer.gains["Q_ell"], dt), dt
         moments = fixed_lag(filtered, *model, ticks) if ticks < n else fixed_interval(filtered, *model)
         estimates = [output.name for output in observer.outputs if output.role == "estimate"]
         scale = columns[f"{estimates[3]}_sd"] ** 2 / memory["P_jerk_jerk"]
@@ -136,7 +138,7 @@ def _smoothed(run: Estimate, observer: Observer, design: ScaledGain, lag: float 
             # Rounding may leave a variance of 0 a hair below it.
             spread = np.sqrt(scale * np.maximum(moments[f"S{i}{i}"], 0.0))
             columns[f"{name}_sd"] = np.where(moving, spread, columns[f"{name}_sd"])
-        sure = moments["S33"] <= SETTLED * float(design.P[3, 3])
+        sure = moments["S33"] <= SETTLED * float(observer.gains["P"][3, 3])
         columns["valid"] = (moving & sure & (np.abs(columns[estimates[0]]) >= SLOW)).astype(float)
     said = {key: value for key, value in provenance(observer).items() if key != "delay_s"}
     said["smoother"] = "fixed interval" if lag is None else f"fixed lag of {ticks * dt:g} s"
@@ -144,8 +146,3 @@ def _smoothed(run: Estimate, observer: Observer, design: ScaledGain, lag: float 
         f"{observer.name}, smoothed", run.grid, columns, observer.outputs, observer.measured, said, run.log,
         None if lag is None else ticks * dt,
     )  # fmt: skip
-
-
-def _texts(observer: Observer) -> dict[str, str]:
-    """An observer's settings as provenance holds them."""
-    return {key: str(value) for key, value in observer.settings.items()}
