@@ -97,7 +97,7 @@ def test_the_stretches_are_what_they_say():
     def of(name, table):
         return table[ROAD_TEST_STRETCHES[name].holds(s)]
 
-    assert np.tan(of("uphill", road.slope)).max() == pytest.approx(0.058, abs=1e-4)
+    assert np.tan(of("uphill", road.slope)).max() == pytest.approx(0.08, abs=1e-4)
     assert np.mean(of("straight", road.slope) == pytest.approx(math.atan(0.015), abs=1e-9)) > 0.8
     assert np.abs(of("straight", road.curvature)).max() == 0.0
     assert np.abs(of("bend", road.curvature)).max() == pytest.approx(1 / 70)

@@ -16,9 +16,12 @@ import numpy as np
 
 from codriver.papers.reproduction import Tell
 from codriver.signals import Log
+from codriver.signals.grid import Flags
+from codriver.signals.signal import Array
 from codriver.simulate.compare import Score, compare, jerk_of, run_estimators
 from codriver.vehicles import Vehicle
 
+SPIKE = 0.5  # s; what is shorter is a spike, and no burst of a driver
 ESTIMATORS = ("intent-pedals", "intent-torque", "kinematic", "pedals-only")
 
 
@@ -47,14 +50,14 @@ class Driven:
         log: decoded from the bus.
         truth: see `codriver.simulate.truth`.
         scores: the estimators at each ell, judged.
-        peaks: 99.9 % quantile of the size of the jerk, by estimator and ell, m/s^3.
+        spikes: by estimator and ell: how far the jerk leaves its mean over half a second, 99.9 % quantile, m/s^3.
     """
 
     job: Job
     log: Log
     truth: Log
     scores: tuple[Score, ...]
-    peaks: Mapping[tuple[str, float | None], float]
+    spikes: Mapping[tuple[str, float | None], float]
 
 
 @dataclass(frozen=True)
@@ -100,5 +103,13 @@ def _drive(job: Job, order: Order) -> Driven:
     test = (road_test if order.where == "road" else track_test)(job.driver, job.seed, sensors=sensors)
     estimates = run_estimators(test.log, order.vehicle, order.estimators, order.ells, preset=order.preset or None)
     use = np.logical_and.reduce([estimate.valid for estimate in estimates.values()])
-    peaks = {key: float(np.quantile(np.abs(jerk_of(estimate)[use]), 0.999)) for key, estimate in estimates.items()}
-    return Driven(job, test.log, test.truth, tuple(compare(estimates, test.truth)), peaks)
+    spikes = {key: _spikes(jerk_of(estimate), use, estimate.grid.dt) for key, estimate in estimates.items()}
+    return Driven(job, test.log, test.truth, tuple(compare(estimates, test.truth)), spikes)
+
+
+def _spikes(jerk: Array, use: Flags, dt: float) -> float:
+    """See `Driven.spikes`."""
+    from scipy.ndimage import uniform_filter1d
+
+    beyond = np.abs(jerk - uniform_filter1d(jerk, round(SPIKE / dt)))
+    return float(np.quantile(beyond[use], 0.999))

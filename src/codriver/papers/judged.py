@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from codriver.papers.drawing import GREEN, PURPLE, TURQUOISE
+from codriver.papers.drawing import BLUE, GREEN, PURPLE, TURQUOISE
 from codriver.papers.drives import Driven
 from codriver.papers.item import Item
 from codriver.papers.reproduction import Chapter
@@ -120,6 +120,7 @@ def _chart(mean: Mean) -> Chart:
     for estimator, color in (
         ("intent-pedals", GREEN),
         ("intent-torque", PURPLE),
+        ("intent-fused", BLUE),
         ("kinematic", TURQUOISE),
         ("pedals-only", GREY),
     ):

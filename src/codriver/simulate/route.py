@@ -23,7 +23,7 @@ _ZONES = (
     (0, 50, 0.8), (500, 70, 1.0), (2300, 60, 0.9),  # out of the suburb
     (3000, 90, 1.1), (6300, 90, 1.0),  # extra-urban
     (9200, 50, 0.9), (10700, 70, 1.0),  # a small town
-    (11500, 90, 1.0), (17800, 70, 1.0),  # extra-urban, with hills
+    (11500, 90, 1.0), (11800, 70, 1.0), (12600, 90, 1.0), (17800, 70, 1.0),  # extra-urban, with hills
     (18500, 50, 0.9), (20000, 70, 1.0),  # the larger town
     (21300, 70, 1.2), (21750, 130, 1.5), (25900, 90, 1.0), (26300, 62, 1.0),  # entry ramp, motorway, exit ramp
     (27000, 90, 1.5), (28960, 70, 1.0),  # the main road of the comparison
@@ -46,7 +46,7 @@ _CURVES = (
 _GRADES = (
     (3300, 200, 0.012), (5000, 200, 0.0), (6500, 150, 0.022), (7200, 150, -0.01), (8000, 150, 0.0),
     (9600, 100, 0.02), (10300, 100, -0.015), (10900, 100, 0.0),
-    (12000, 60, 0.058), (12260, 60, 0.0),  # the short uphill segment
+    (12000, 60, 0.08), (12260, 60, 0.0),  # the short uphill segment
     (12800, 120, -0.03), (13500, 120, 0.0), (15000, 150, 0.035), (15900, 200, -0.04), (16900, 200, 0.0),
     (19000, 100, 0.018), (19700, 100, 0.0), (22500, 400, -0.008), (25500, 400, 0.01), (26700, 150, 0.03),
     (27000, 120, 0.0), (27700, 200, -0.012), (28300, 200, 0.008), (28900, 150, 0.0),
@@ -78,8 +78,8 @@ ROAD_TEST_STRETCHES: dict[str, Stretch] = {
     "bend": Stretch(27_210, 27_400, "sharp bend of the main road (box 2)"),
     "other_car": Stretch(27_500, 27_800, "another car seems to come out, then does not: brake, accelerate (box 3)"),
     "roundabout": Stretch(28_700, 29_000, "give way at a roundabout, through it and out (box 4)"),
-    "uphill": Stretch(11_950, 12_400, "short uphill segment, 5.8 % (figure 6, middle)"),
-    "straight": Stretch(30_500, 31_150, "slightly inclined straight, 1.5 % (figure 6, right)"),
+    "uphill": Stretch(11_950, 12_400, "short uphill segment, 8 %, on which the gearbox shifts down (figure 6, middle)"),
+    "straight": Stretch(31_560, 31_990, "slightly inclined straight, 1.5 %, sped up on from a stop (figure 6, right)"),
     "motorway": Stretch(33_500, 47_000, "motorway"),
     "town": Stretch(18_500, 20_600, "urban: stops and tight turns"),
 }

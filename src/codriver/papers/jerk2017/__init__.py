@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from codriver.estimate import Estimate
-from codriver.papers.drives import Driven, Job, Order, drives
+from codriver.papers.drives import ESTIMATORS, Driven, Job, Order, drives
 from codriver.papers.item import Item, near
 from codriver.papers.jerk2017.alternatives import alternatives_chapter
 from codriver.papers.jerk2017.drivers import drivers_chapter
@@ -40,7 +40,7 @@ def reproduce(tell: Tell, quick: bool, recordings: Path | None) -> Reproduction:
     noisy = [Job(last.driver, last.seed, *level) for level in PEDAL_NOISE_LEVELS[1:]]
     if quick:
         jobs, noisy = jobs[-2:], noisy[-1:]
-    order = Order("road", load_vehicle(VEHICLE), PRESET, ELLS)
+    order = Order("road", load_vehicle(VEHICLE), PRESET, ELLS, (*ESTIMATORS, "intent-fused"))
     driven = drives([*jobs, *noisy], order, tell)
     return reproduction(driven[: len(jobs)], driven[len(jobs) :], tell)
 

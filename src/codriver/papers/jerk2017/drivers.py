@@ -21,8 +21,8 @@ from codriver.simulate.compare import rms
 from codriver.simulate.judge import at
 
 STEP = 1.0  # m along the road
-_LETTING_GO = -0.4  # m/s^2: intentional acceleration below which a driver has begun to slow down
-_BEFORE = 250.0  # m before a line in which that is looked for
+_KEEPING = -0.1  # m/s^2: an intentional acceleration above it keeps the speed
+_BEFORE = 450.0  # m before a line in which the slowing down is looked for
 
 
 def drivers_chapter(drives: Mapping[str, Driven], estimates: Mapping[str, Estimate]) -> Chapter:
@@ -151,41 +151,50 @@ def _styles(
 ) -> tuple[Item, ...]:  # fmt: skip
     """Who drives how, over the whole drive; and who anticipates."""
     jerk = {name: rms(e.columns["intentional_jerk"][e.valid]) for name, e in estimates.items()}
+    pedals = {name: _pedal_rate(e) for name, e in estimates.items()}
     order = sorted(jerk, key=lambda name: -jerk[name])
-    said = ", ".join(f"{name} {jerk[name]:.2f}" for name in order)
-    names = list(found)
-    items = []
-    if len(names) == 6:
-        first, second, third, fourth, fifth, sixth = names
-        items = [
-            Item("fig. 7: the first and partly the fourth driver are aggressive", "first, fourth", f"{order[0]}, {order[1]}", "",
-                 {order[0], order[1]} == {first, fourth}, f"largest rms of the intentional jerk over the drive (m/s³): {said}"),
-            Item("fig. 7: the fifth driver is the smoothest", "fifth", order[-1], "", order[-1] == fifth,
-                 "smallest rms of the intentional jerk"),
-            Item("fig. 7: the third and sixth driver lie between", "between",
-                 f"{order.index(third) + 1} and {order.index(sixth) + 1} of 6", "",
-                 all(jerk[fifth] < jerk[n] < jerk[first] for n in (third, sixth)), "rank by rms of the intentional jerk"),
-        ]  # fmt: skip
-        for line, number in ((27_000.0, 1), (28_900.0, 4)):
-            ahead = {n: _anticipation(drives[n], estimates[n], line) for n in names}
-            earliest = max(ahead, key=lambda n: ahead[n])
-            items.append(Item(
-                f"fig. 7, box {number}: the second driver anticipates the deceleration most", "second", earliest, "",
-                earliest == second, "distance before the line where the intentional acceleration first falls below "
-                f"{_LETTING_GO:g} m/s²: " + ", ".join(f"{n} {d:.0f} m" for n, d in ahead.items()),
-            ))  # fmt: skip
+    busy = sorted(pedals, key=lambda name: -pedals[name])
+    if len(found) < 6:
+        return ()
+    first, second, third, fourth, fifth, sixth = found
+    items = [
+        Item("fig. 7: the first driver and partly the fourth use the pedals aggressively", "first, then fourth",
+             f"{busy[0]}, then {busy[1]}", "", busy[0] == first and fourth in busy[1:3],
+             "rms pedal rate, %/s: " + ", ".join(f"{name} {pedals[name]:.0f}" for name in busy)
+             + "; the fourth second or third counts, for “partly”"),
+        Item("fig. 7: the first driver's jerk has the most and largest bursts", "first", order[0], "", order[0] == first,
+             "rms of the intentional jerk, m/s³: " + ", ".join(f"{name} {jerk[name]:.2f}" for name in order)),
+        Item("fig. 7: the fifth driver is the smoothest", "fifth", order[-1], "", order[-1] == fifth, "smallest rms of the jerk"),
+        Item("fig. 7: the third and sixth driver lie between", "between",
+             f"{order.index(third) + 1} and {order.index(sixth) + 1} of 6", "",
+             all(jerk[fifth] < jerk[n] < jerk[first] for n in (third, sixth)), "rank by rms of the jerk"),
+    ]  # fmt: skip
+    for line, number in ((27_000.0, 1), (28_900.0, 4)):
+        ahead = {n: _anticipation(drives[n], estimates[n], line) for n in found}
+        earliest = max(ahead, key=lambda n: ahead[n])
+        items.append(Item(
+            f"fig. 7, box {number}: the second driver anticipates the deceleration most", "second", earliest, "",
+            earliest == second, "distance before the line where the last slowing down for it begins: "
+            + ", ".join(f"{n} {d:.0f} m" for n, d in ahead.items()),
+        ))  # fmt: skip
     return tuple(items)
 
 
+def _pedal_rate(estimate: Estimate) -> float:
+    """Rms rate of the accelerator where the estimate is valid, over a tenth of a second, so that its steps count little; %/s."""
+    pedal, span = estimate.grid.values["accelerator_pedal"], round(0.1 / estimate.grid.dt)
+    rate = np.zeros(pedal.size)
+    rate[span:] = (pedal[span:] - pedal[:-span]) / 0.1
+    return 100 * rms(rate[estimate.valid & np.isfinite(rate)])
+
+
 def _anticipation(driven: Driven, estimate: Estimate, line: float) -> float:
-    """How far before a line (m) a driver has begun to slow down for it, m; 0 if he has not."""
-    part = window_in(estimate, driven.truth, line - _BEFORE, line)
-    distance = at(driven.truth, "distance", part(estimate.time))
-    slowing = part(estimate.columns["intentional_acceleration"]) < _LETTING_GO
-    # The last time it began, so that an earlier bend does not count.
-    starts = np.flatnonzero(np.diff(slowing.astype(np.int8), prepend=0) == 1)
-    lasting = [k for k in starts if slowing[k : k + 100].mean() > 0.8]
-    return float(line - distance[lasting[0]]) if lasting else 0.0
+    """How far before a line (m) the last slowing down for it began."""
+    part = window_in(estimate, driven.truth, line - _BEFORE, line + 20.0)
+    distance, speed = at(driven.truth, "distance", part(estimate.time)), part(estimate.columns["longitudinal_speed"])
+    slowest = int(np.argmin(speed))
+    keeping = np.flatnonzero(part(estimate.columns["intentional_acceleration"])[:slowest] > _KEEPING)
+    return float(line - distance[keeping[-1] + 1 if keeping.size else 0])
 
 
 def _table(found: Mapping[str, _Along], estimates: Mapping[str, Estimate]) -> Table:
@@ -193,10 +202,9 @@ def _table(found: Mapping[str, _Along], estimates: Mapping[str, Estimate]) -> Ta
     for number, (name, estimate) in enumerate(estimates.items(), 1):
         jerk = estimate.columns["intentional_jerk"][estimate.valid]
         a_i = estimate.columns["intentional_acceleration"][estimate.valid]
-        pedal = estimate.grid.values["accelerator_pedal"]
         rows.append((
             f"{number} {name}", rms(jerk), *(float(q) for q in np.percentile(jerk, (1, 99))), rms(a_i),
-            100 * rms(np.diff(pedal[np.isfinite(pedal)])) / estimate.grid.dt, float(estimate.time[-1]) / 60,
+            _pedal_rate(estimate), float(estimate.time[-1]) / 60,
         ))  # fmt: skip
     return Table(
         ("driver", "jerk, rms m/s³", "1 %", "99 %", "acceleration, rms m/s²", "pedal rate, rms %/s", "drive, min"), tuple(rows),
