@@ -66,7 +66,7 @@ def likelihood() -> None:
         each.append([style, f"{alone.profile.best:.2f}", f"{alone.chosen.slow_delay:.2f}"])
     print(table(["tuned on one driver alone", "most likely ell", "delay of fitted Q, R, s"], each))
     own, rows = found.preset, []
-    settings = [("bisoffi2017", PAPER, ell) for ell in (1.0, 2.0, 3.0, found.profile.best)] + [("fitted", own, own.ell)]
+    settings = [("bisoffi2017", PAPER, found.profile.best), ("fitted", own, own.ell)]
     for wanted in (0.911, 0.456, 0.304, 0.2):
         settings += [("bisoffi2017", PAPER, ell_for_delay(PAPER, wanted)), ("fitted", own, ell_for_delay(own, wanted))]
     for name, preset, ell in settings:
