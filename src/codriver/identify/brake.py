@@ -89,7 +89,7 @@ class BrakeFit:
         block: s, length of a block of the bootstrap; `blocks` how many.
         curve: figure 2.
         rows, model: filtered signals, and a_ID on all ticks, m/s^2.
-        fitted, validated: ticks of the halves.
+        fitted, validated: ticks of the halves, the first without its outliers.
         lags, correlation: autocorrelation of the residuals, s and 1.
         sources: of the logs.
     """
@@ -189,7 +189,7 @@ def identify_brake(
         coefficients, tuple(refused), tuple(offsets), bias is not None, _minutes(first, dt), _minutes(second, dt),
         _minutes(first & rows.pressed, dt), rows.share, float(rows.keep.mean()), fit.trimmed,
         _rms(e[second]), _old(rows, force, vehicle, M, first, second),
-        _rms(rows.y[second] - rows.y[first].mean()), fit.length * dt, fit.blocks, curve, rows, model, first, second,
+        _rms(rows.y[second] - rows.y[first].mean()), fit.length * dt, fit.blocks, curve, rows, model, fit.used, second,
         np.arange(most + 1, dtype=float) * dt, autocorrelation(e, fit.used, rows.pieces, most),
         tuple(short_name(log) for log in logs),
     )  # fmt: skip

@@ -22,7 +22,7 @@ from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
 
 LOW_PASS = 5.0  # Hz, 2017 section IV-A
-RATE_PASS = 1.0  # Hz, of a rate taken from a noisy signal
+RATE_PASS = 1.5  # Hz, of a rate taken from a noisy signal
 
 
 def low_pass(x: Array, dt: float, frequency: float = LOW_PASS) -> Array:

@@ -40,7 +40,7 @@ LEAST_FREEDOM = 3
 SPEED_RANGE = 100.0  # m^2/s^2, standard deviation of v^2: below it drag cannot be told from k_1
 MOST_GEARS = 12
 GAIN_SD = 0.02  # greatest standard error of gamma, for it to be used
-LEAST_SLOPE = 0.08  # m/s^2, RMS of dv/dt that the other columns do not make up; wheel noise alone makes some 0.03
+LEAST_SLOPE = 0.1  # m/s^2, RMS of dv/dt that the other columns do not make up; wheel noise alone makes some 0.05
 
 
 @dataclass(frozen=True)

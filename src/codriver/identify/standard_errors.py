@@ -29,41 +29,43 @@ Index = npt.NDArray[np.intp]  # first rows of logs or blocks
 
 DRAWS = 500
 LEAST_ALIKE = 0.05
-LONGEST = 0.25  # of a piece: no autocorrelation is looked for beyond
+# No autocorrelation is looked for beyond: this share of a log, and so many ticks.
+LONGEST, MOST_LAGS = 0.25, 6000
 
 
 def autocorrelation(e: Array, used: Flags, pieces: Index, most: int) -> Array:
-    """Autocorrelation of residuals that have holes, lags 0 to `most`.
+    """Autocorrelation of series that have holes, lags 0 to `most`, shape (most + 1,) or (most + 1, m).
 
     Args:
-        e: residuals, shape (n,).
+        e: residuals, shape (n,) or (n, m).
         used: which of them count, shape (n,).
         pieces: first rows of the logs, and n, shape (logs + 1,); no pair crosses them.
         most: greatest lag, ticks.
     """
     from scipy.fft import irfft, next_fast_len, rfft
 
-    product, pairs = np.zeros(most + 1), np.zeros(most + 1)
-    mean = float(e[used].mean()) if used.any() else 0.0
+    columns = e.reshape(e.shape[0], -1).T
+    mean = columns[:, used].mean(axis=1, keepdims=True) if used.any() else 0.0
+    series = np.vstack([np.where(used, columns - mean, 0.0), used.astype(float)])
+    total = np.zeros((series.shape[0], most + 1))
     for i, k in pairwise(pieces):
-        there = used[i:k].astype(float)
-        size = next_fast_len(int(k - i) + most + 1, real=True)
-        for x, total in (((e[i:k] - mean) * there, product), (there, pairs)):
-            spectrum = rfft(x, size)
-            lags = min(most + 1, size)
-            total[:lags] += irfft(np.abs(spectrum) ** 2, size)[:lags]
-    covariance = product / np.maximum(pairs, 0.5)
-    return np.asarray(covariance / covariance[0]) if covariance[0] > 0 else np.zeros(most + 1)
+        lags = min(most, int(k - i) - 1) + 1
+        size = next_fast_len(int(k - i) + lags, real=True)
+        for row, x in zip(total, series, strict=True):
+            spectrum = rfft(x[i:k], size)
+            row[:lags] += irfft(spectrum.real**2 + spectrum.imag**2, size)[:lags]
+    covariance = total[:-1] / np.maximum(total[-1], 0.5)
+    rho = covariance / np.where(covariance[:, :1] > 0, covariance[:, :1], 1.0)
+    return np.asarray(rho.T.reshape(most + 1, *e.shape[1:]))
 
 
 def block_length(X: Array, e: Array, used: Flags, pieces: Index) -> int:
     """L, ticks: see the module's docstring."""
     longest = int(np.diff(pieces).max())
-    most = max(min(round(LONGEST * longest), 20_000), 1)
+    most = max(min(round(LONGEST * longest), MOST_LAGS), 1)
     influence = X @ np.linalg.inv(X[used].T @ X[used]) * e[:, None]
     alike = 1.0
-    for series in (e, *influence.T):
-        rho = autocorrelation(series, used, pieces, most)
+    for rho in autocorrelation(np.column_stack([e, influence]), used, pieces, most).T:
         below = np.flatnonzero(rho[1:] < LEAST_ALIKE)
         first = int(below[0]) + 1 if below.size else rho.size
         alike = max(alike, 1.0 + 2.0 * float(rho[1:first].sum()))

@@ -9,7 +9,7 @@ for up to a second after a shift.
     shift      from 0.2 s before the clutch opens or the gear changes until 1 s after it closed; neutral
     slow       below 2 m/s, and half a second around it
     reverse    reverse gear or negative speed
-    slip       accelerometer and change of speed, both below 1 Hz, part by more than 1.5 m/s^2 from their usual difference
+    slip       accelerometer and change of speed, both below 1.5 Hz, part by more than 1.5 m/s^2 from their usual difference
     gear       a gear that the vehicle file lacks
 
 For ratios, where no brake coefficient is sought, also `braking`, until a second after it.
