@@ -124,7 +124,9 @@ class TestFilter:
         found, expected = rate(np.sin(w * t), 0.01)[1000:-1000], low_pass(w * np.cos(w * t), 0.01)[1000:-1000]
         lag = (np.argmax(np.correlate(found, expected, "full")) - (found.size - 1)) * 0.01
         assert abs(lag) <= 0.01
-        assert found.std() == pytest.approx(expected.std() / (1 + (0.2 / 1.5) ** 2), rel=2e-3)  # 1.5 Hz, forwards and backwards
+        assert found.std() == pytest.approx(
+            expected.std() / (1 + (0.2 / 1.5) ** 2), rel=2e-3
+        )  # 1.5 Hz, forwards and backwards
         assert np.allclose(smooth(np.full(50, 3.0), 0.01), 3.0)
 
     def test_centred_holds_make_rates_alike(self):
