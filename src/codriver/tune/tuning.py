@@ -138,7 +138,9 @@ def tune(
     chosen_name, _ = choose(estimator, logs[0], vehicle)
     begun = find_preset(preset if preset is not None else _DEFAULT)
     probe = build(chosen_name, vehicle, preset=begun)
-    if [o.name.removesuffix("_innovation") for o in probe.outputs if o.role == "innovation"] != list(ROWS):
+    rows_found = [o.name.removesuffix("_innovation") for o in probe.outputs if o.role == "innovation"]
+    # A fused estimator has these rows too, but its ell is that of another filter.
+    if rows_found != list(ROWS) or "rest_ell" in probe.settings:
         raise UsageError(
             f"{chosen_name} has no noise that could be tuned so",
             "intent-pedals, intent-torque or kinematic",
