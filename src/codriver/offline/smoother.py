@@ -14,12 +14,12 @@ filter, and so is the last sample. Then the passes go over its means and covaria
 * `valid`: moving faster than 1 m/s, inputs known, and the jerk's variance at most what a settled filter's may be. So the
   first seconds of a stretch, of which the filter knows little, may be valid here.
 
-Innovations, their use by `check()`, and the other flags are the filter's.
+Innovations and the other flags are the filter's; `check()` judges them where the filter was valid.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +39,7 @@ from codriver.program import compile, provenance
 from codriver.run import choose
 from codriver.signals import Log
 from codriver.signals.signal import Array
+from codriver.trust import Check, check_estimate
 from codriver.vehicles import Vehicle, load_vehicle
 
 _MEANS = [f"x_{state}" for state in STATES]
@@ -51,9 +52,16 @@ class SmoothedEstimate(Estimate):
 
     Attributes:
         lag: how far ahead it looks, s; None for the whole stretch.
+        filter_valid: the flag `valid` of the filter that ran first, shape (n,): where its innovations can be judged.
     """
 
     lag: float | None
+    filter_valid: Array = field(repr=False)
+
+    def check(self) -> Check:
+        """Whether to trust it: what the filter's innovations say, where the filter was valid, and the flags."""
+        columns = {**self.columns, "valid": self.filter_valid}
+        return check_estimate(columns, self.outputs, self.grid, self.measured, self.log, self._knob())
 
 
 def smooth(
@@ -144,5 +152,5 @@ def _smoothed(run: Estimate, observer: Observer, lag: float | None) -> SmoothedE
     said["smoother"] = "fixed interval" if lag is None else f"fixed lag of {ticks * dt:g} s"
     return SmoothedEstimate(
         f"{observer.name}, smoothed", run.grid, columns, observer.outputs, observer.measured, said, run.log,
-        None if lag is None else ticks * dt,
+        None if lag is None else ticks * dt, run.columns["valid"],
     )  # fmt: skip
