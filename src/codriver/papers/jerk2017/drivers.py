@@ -21,8 +21,10 @@ from codriver.simulate.compare import rms
 from codriver.simulate.judge import at
 
 STEP = 1.0  # m along the road
-_KEEPING = -0.1  # m/s^2: an intentional acceleration above it keeps the speed
-_BEFORE = 450.0  # m before a line in which the slowing down is looked for
+# Where slowing down for a line is looked for: line and metres before it, and the number of the box. The share of it done
+# that is looked for: on the ramp the slowing has begun before, for its speed limit.
+_LINES = ((27_000.0, 250.0, 1), (28_900.0, 450.0, 4))
+_DONE = 0.2
 
 
 def drivers_chapter(drives: Mapping[str, Driven], estimates: Mapping[str, Estimate]) -> Chapter:
@@ -169,12 +171,12 @@ def _styles(
              f"{order.index(third) + 1} and {order.index(sixth) + 1} of 6", "",
              all(jerk[fifth] < jerk[n] < jerk[first] for n in (third, sixth)), "rank by rms of the jerk"),
     ]  # fmt: skip
-    for line, number in ((27_000.0, 1), (28_900.0, 4)):
-        ahead = {n: _anticipation(drives[n], estimates[n], line) for n in found}
+    for line, before, number in _LINES:
+        ahead = {n: _anticipation(drives[n], estimates[n], line, before) for n in found}
         earliest = max(ahead, key=lambda n: ahead[n])
         items.append(Item(
             f"fig. 7, box {number}: the second driver anticipates the deceleration most", "second", earliest, "",
-            earliest == second, "distance before the line where the last slowing down for it begins: "
+            earliest == second, f"distance before the line where {_DONE:.0%} of the slowing down for it is done: "
             + ", ".join(f"{n} {d:.0f} m" for n, d in ahead.items()),
         ))  # fmt: skip
     return tuple(items)
@@ -188,13 +190,14 @@ def _pedal_rate(estimate: Estimate) -> float:
     return 100 * rms(rate[estimate.valid & np.isfinite(rate)])
 
 
-def _anticipation(driven: Driven, estimate: Estimate, line: float) -> float:
-    """How far before a line (m) the last slowing down for it began."""
-    part = window_in(estimate, driven.truth, line - _BEFORE, line + 20.0)
+def _anticipation(driven: Driven, estimate: Estimate, line: float, before: float) -> float:
+    """How far before a line (m) a share of the slowing down for it is done; looked at from `before` m ahead of it on."""
+    part = window_in(estimate, driven.truth, line - before, line + 20.0)
     distance, speed = at(driven.truth, "distance", part(estimate.time)), part(estimate.columns["longitudinal_speed"])
     slowest = int(np.argmin(speed))
-    keeping = np.flatnonzero(part(estimate.columns["intentional_acceleration"])[:slowest] > _KEEPING)
-    return float(line - distance[keeping[-1] + 1 if keeping.size else 0])
+    level = speed[slowest] + (1 - _DONE) * (float(np.max(speed[: slowest + 1])) - speed[slowest])
+    above = np.flatnonzero(speed[:slowest] > level)
+    return float(line - distance[above[-1] if above.size else 0])
 
 
 def _table(found: Mapping[str, _Along], estimates: Mapping[str, Estimate]) -> Table:

@@ -142,14 +142,15 @@ def _boxes(driven: Driven, middle: Estimate) -> tuple[Item, ...]:
 
 
 def bursts(driven: Driven, estimate: Estimate, stretch: str) -> list[float]:
-    """Peaks of the estimated jerk (m/s^3) beyond _BURST in a stretch of the road, in order of time."""
+    """Peaks of the estimated jerk (m/s^3) beyond _BURST in a stretch of the road, in order of time; one until it fades."""
     place = ROAD_TEST_STRETCHES[stretch]
     part = window_in(estimate, driven.truth, place.start, place.stop)
     jerk = np.where(part(estimate.valid), part(estimate.columns["intentional_jerk"]), 0.0)
-    side = np.where(np.abs(jerk) > _BURST, np.sign(jerk), 0.0)
+    side = np.where(np.abs(jerk) > 0.5 * _BURST, np.sign(jerk), 0.0)
     edges = np.flatnonzero(np.diff(side, prepend=0.0, append=0.0))
     pieces = [jerk[a:b] for a, b in itertools.pairwise(edges) if side[a] != 0]
-    return [float(piece[np.argmax(np.abs(piece))]) for piece in pieces]
+    peaks = [float(piece[np.argmax(np.abs(piece))]) for piece in pieces]
+    return [peak for peak in peaks if abs(peak) > _BURST]
 
 
 def in_order(found: list[float], signs: tuple[int, ...]) -> bool:
