@@ -117,6 +117,12 @@ class TestFilter:
             t = np.arange(step.size) * dt - 10 * dt
             assert np.allclose(low_pass(step, dt), np.where(t > 0, 1 - np.exp(-2 * np.pi * 5 * t), 0), atol=1e-13)
 
+    def test_silence_is_zero(self):
+        """What has faded is nothing, and no denormal number, which would be slow."""
+        faded = low_pass(np.concatenate([np.ones(10), np.zeros(5000)]), 0.01)
+        assert (np.abs(faded[-1000:]) < 1e-40).all()
+        assert not ((np.abs(faded) > 0) & (np.abs(faded) < np.finfo(float).tiny)).any()
+
     def test_rate_does_not_lag(self):
         """Rate and signal through their filters keep their phase: 0.2 Hz, against the signal through the 5 Hz one alone."""
         t = np.arange(6000) * 0.01
@@ -646,6 +652,11 @@ class TestVehicleAgainstLog:
         assert "bar taken for Pa" in self.worst(changed(demo.measured, "brake_pressure", lambda p: p * 1e-5), car)
         assert "the sign is wrong" in self.worst(changed(demo.measured, "engine_torque", lambda x: -x), car)
 
+    def test_an_engine_that_stands_is_no_engine_speed(self, demo, car):
+        still = changed(demo.measured, "engine_speed", lambda x: 0 * x)
+        assert [f.severity for f in check_vehicle_against_log(still, car)] == ["ok"] * 3
+        assert identify_ratio(still).engine_turns == {}
+
     def test_nothing_to_judge(self, car, demo):
         assert check_vehicle_against_log(cd.Log({}), car) == ()
         assert check_vehicle_against_log(demo.measured.between(0, 2), car) == ()
@@ -730,6 +741,12 @@ class TestCommand:
         assert told["coefficients"]
         assert "</html>" in report.read_text()
         assert sorted(p.name for p in tmp_path.iterdir()) == ["r.html", "v2.toml"]
+
+    def test_help(self, run):
+        for command in ((), ("brake",), ("pedal",), ("ratio",)):
+            code, text, _ = run("identify", *command, "--help")
+            assert code == 0
+            assert "Usage: codriver identify" in text
 
     def test_table(self, run, can, tmp_path):
         code, text, _ = run("identify", "brake", *can, "--vehicle", "bisoffi2017", "-o", tmp_path / "v.toml")

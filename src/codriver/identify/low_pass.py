@@ -22,6 +22,7 @@ from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
 
 LOW_PASS = 5.0  # Hz, 2017 section IV-A
+TINY = 1e-30
 RATE_PASS = 1.5  # Hz, of a rate taken from a noisy signal
 
 
@@ -41,9 +42,10 @@ def low_pass(x: Array, dt: float, frequency: float = LOW_PASS) -> Array:
     bidiagonal = np.empty((2, x.shape[0]), order="F")
     bidiagonal[0], bidiagonal[1] = 1.0, -a
     held = np.empty(x.shape, order="F")
-    held[0], held[1:] = x[0], (1 - a) * x[:-1]
+    # A signal that is 0 for long would fade into denormal numbers, which are fifty times slower.
+    held[0], held[1:] = x[0] + TINY, (1 - a) * (x[:-1] + TINY)
     filtered, _ = lapack.dtbtrs(bidiagonal, held, uplo="L", overwrite_b=1)
-    return np.asarray(filtered).reshape(x.shape)
+    return np.asarray(filtered - TINY).reshape(x.shape)
 
 
 def smooth(x: Array, dt: float) -> Array:

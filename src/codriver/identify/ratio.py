@@ -248,6 +248,7 @@ def engine_turns(logs: Sequence[Log], rows: DriveRows, gears: int) -> dict[int, 
     found = {}
     for gear in range(1, gears + 1):
         there = rows.keep & (rows.gear == gear) & np.isfinite(turns)
-        if there.sum() * rows.dt >= 1.0:
-            found[gear] = float(np.median(turns[there]))
+        # An engine that does not turn while the car moves is a signal that is not there.
+        if there.sum() * rows.dt >= 1.0 and abs(here := float(np.median(turns[there]))) > 0.01:
+            found[gear] = here
     return found
