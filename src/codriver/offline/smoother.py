@@ -14,7 +14,7 @@ filter, and so is the last sample. Then the passes go over its means and covaria
 * `valid`: moving faster than 1 m/s, inputs known, and the jerk's variance at most what a settled filter's may be. So the
   first seconds of a stretch, of which the filter knows little, may be valid here.
 
-Innovations and the other flags are the filter's; `check()` judges them where the filter was valid.
+Innovations and the other flags are the filter's; `check()` judges them where the filter has been valid for a second.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from codriver.models import intention_model
 from codriver.observers import build
 from codriver.observers.feed import suggest_rate
 from codriver.observers.jerk import SLOW
-from codriver.observers.jerk_forms import SETTLED, STATES
+from codriver.observers.jerk_forms import ROWS, SETTLED, STATES
 from codriver.observers.observer import Observer, Output, Scalars
 from codriver.observers.scaled_gain import Preset
 from codriver.offline.conditional import PAIRS
@@ -42,6 +42,7 @@ from codriver.signals.signal import Array
 from codriver.trust import Check, check_estimate
 from codriver.vehicles import Vehicle, load_vehicle
 
+SECOND = 1.0  # s for which a filter was valid before its innovations are judged; until then they tell of its start
 _MEANS = [f"x_{state}" for state in STATES]
 _COVARIANCES = [f"P_{STATES[i]}_{STATES[j]}" for i, j in PAIRS]
 
@@ -59,8 +60,13 @@ class SmoothedEstimate(Estimate):
     filter_valid: Array = field(repr=False)
 
     def check(self) -> Check:
-        """Whether to trust it: what the filter's innovations say, where the filter was valid, and the flags."""
-        columns = {**self.columns, "valid": self.filter_valid}
+        """Whether to trust it: what the flags say, and the innovations since the filter was valid for a second."""
+        ticks = np.arange(len(self.grid))
+        unsettled = np.maximum.accumulate(np.where(self.filter_valid > 0.5, -ticks.size, ticks))
+        judged = ticks - unsettled > SECOND / self.grid.dt
+        columns = dict(self.columns)
+        for row in ROWS:
+            columns[f"{row}_used"] = columns[f"{row}_used"] * judged
         return check_estimate(columns, self.outputs, self.grid, self.measured, self.log, self._knob())
 
 
