@@ -22,21 +22,29 @@ def reproduce(
 
     Example: codriver reproduce jerk2017 jerk2015 -o papers
     """
-    from codriver.cli.terminal import command_line, console, working
-    from codriver.errors import UsageError
     from codriver.papers import PAPERS
     from codriver.papers import reproduce as make
 
     for name in papers:
         if name not in PAPERS:
             make(name)  # raises, and says which there are
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"--out {out} is a file", "a folder, or a name that is free", "choose another --out")
+    fresh = _folder(out)
+    try:
+        _make(list(dict.fromkeys(papers)), out, recordings, quick)
+    finally:
+        if fresh and not any(out.iterdir()):
+            out.rmdir()
+
+
+def _make(papers: list[str], out: Path, recordings: Path, quick: bool) -> None:
+    """Each paper in turn, written as soon as it is made."""
+    from codriver.cli.terminal import command_line, console, working
+    from codriver.papers import reproduce as make
+
     screen = console()
-    for name in dict.fromkeys(papers):
+    for name in papers:
         with working(True, 3) as stage:
             made = make(name, stage, quick=quick, recordings=recordings)
-        out.mkdir(parents=True, exist_ok=True)
         page, data = made.write(out, command_line())
         counts = {v: sum(i.holds is v for i in made.items) for v in (True, False, None)}
         screen.print(
@@ -50,6 +58,28 @@ def reproduce(
                     markup=False,
                 )
         screen.print(f"wrote {page} and {data}", markup=False)
+
+
+def _folder(out: Path) -> bool:
+    """Make the folder before the long work; whether it is new.
+
+    Raises:
+        UsageError: it is a file, or cannot be made or written into.
+    """
+    import os
+
+    from codriver.errors import UsageError
+
+    if out.exists() and not out.is_dir():
+        raise UsageError(f"--out {out} is a file", "a folder, or a name that is free", "choose another --out")
+    fresh = not out.exists()
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"--out {out} cannot be made: {error.strerror}", "a folder", "choose another --out") from None
+    if not os.access(out, os.W_OK):
+        raise UsageError(f"--out {out} cannot be written into", "a folder you may write into", "choose another --out")
+    return fresh
 
 
 def _said(value: float | str) -> str:

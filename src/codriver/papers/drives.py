@@ -7,10 +7,11 @@ the log decoded from the bus, and beside it the truth, which no estimator sees.
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 
 import numpy as np
 
@@ -87,8 +88,20 @@ def drives(jobs: Sequence[Job], order: Order, tell: Tell) -> list[Driven]:
     if workers < 2:
         return [_drive(job, order) for job in jobs]
     # "spawn": a forked copy of a process that has threads may lock up.
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        return list(pool.map(_drive, jobs, [order] * len(jobs)))
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_quietly) as pool:
+        try:
+            return list(pool.map(_drive, jobs, [order] * len(jobs)))
+        except BaseException:
+            # Else the pool would wait for the drives under way.
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in active_children():
+                process.terminate()
+            raise
+
+
+def _end_quietly() -> None:
+    """In a process of its own: Ctrl-C ends it without a traceback; the main process says what happened."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _drive(job: Job, order: Order) -> Driven:
