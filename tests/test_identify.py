@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -842,11 +841,3 @@ def test_rows_share_one_filter(demo):
     y = demo.measured["longitudinal_acceleration"]
     held = np.interp(rows.time, y.time - 0.005, y.values)
     assert np.std(rows.y - low_pass(held, 0.01)) < 0.02
-
-
-def test_replace_keeps_truth_apart():
-    """The simulator's gain error is what gamma ought to find."""
-    from codriver.simulate import SensorParameters
-
-    assert replace(SensorParameters()).pitch_gain * 9.80665 == pytest.approx(PITCH)
-    assert SensorParameters().bias == BIAS

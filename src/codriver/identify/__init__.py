@@ -1,6 +1,7 @@
 """Coefficients of a vehicle from its own drives, and whether a vehicle file fits a drive."""
 
-from codriver.identify.brake import BrakeFit, Coefficient, Refusal, identify_brake
+from codriver.identify.brake import identify_brake
+from codriver.identify.brake_fit import BrakeFit, Coefficient, Refusal
 from codriver.identify.check_log import check_vehicle_against_log
 from codriver.identify.learning import LearningPoint
 from codriver.identify.pedal import PedalFit, identify_pedal

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from codriver.identify import BrakeFit, GearRatio, PedalFit, RatioFit
-from codriver.identify.brake import ODD_GAIN, PARAMETERS
+from codriver.identify.brake import ODD_GAIN
+from codriver.identify.brake_fit import PARAMETERS
 from codriver.identify.pedal import REASONS as PEDAL_REASONS
 from codriver.identify.usable import REASONS
 from codriver.report.document import Chart, Curve, Document, Findings, Mark, Plot, Section, Span, Table
