@@ -20,7 +20,7 @@ from codriver.errors import UsageError
 from codriver.estimate import Estimate
 from codriver.observers import build, find_preset
 from codriver.observers.feed import suggest_rate
-from codriver.observers.jerk_forms import ROWS
+from codriver.observers.jerk_forms import ROWS, STATES
 from codriver.observers.scaled_gain import Preset
 from codriver.program import compile
 from codriver.run import check_rate, choose
@@ -138,9 +138,8 @@ def tune(
     chosen_name, _ = choose(estimator, logs[0], vehicle)
     begun = find_preset(preset if preset is not None else _DEFAULT)
     probe = build(chosen_name, vehicle, preset=begun)
-    rows_found = [o.name.removesuffix("_innovation") for o in probe.outputs if o.role == "innovation"]
-    # A fused estimator has these rows too, but its ell is that of another filter.
-    if rows_found != list(ROWS) or "rest_ell" in probe.settings:
+    # A fused estimator carries these states by other names: its ell is that of another filter.
+    if not {f"x_{state}" for state in STATES} <= set(probe.carry):
         raise UsageError(
             f"{chosen_name} has no noise that could be tuned so",
             "intent-pedals, intent-torque or kinematic",
