@@ -841,3 +841,27 @@ def test_rows_share_one_filter(demo):
     y = demo.measured["longitudinal_acceleration"]
     held = np.interp(rows.time, y.time - 0.005, y.values)
     assert np.std(rows.y - low_pass(held, 0.01)) < 0.02
+
+
+def test_the_report_tells_what_the_log_says_of_the_vehicle(tmp_path):
+    """What the terminal says of a wrong c_r stands in the HTML report too."""
+    from codriver.cli.estimate import estimate_file
+    from codriver.simulate import write_demo
+
+    files = write_demo(tmp_path / "demo")
+    wrong = cd.load_vehicle("bisoffi2017")
+    wrong = wrong.with_parameter("pedal_coefficient", 2 * wrong.number("pedal_coefficient"))
+    save_vehicle(wrong, tmp_path / "wrong.toml")
+    report = tmp_path / "report.html"
+    estimate_file(
+        "intent-pedals",
+        files.log,
+        tmp_path / "o.parquet",
+        str(tmp_path / "wrong.toml"),
+        files.dbc,
+        files.names,
+        report=report,
+    )
+    text = report.read_text(encoding="utf-8")
+    assert "Do not trust this estimate" in text
+    assert "vehicle file:" in text

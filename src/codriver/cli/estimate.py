@@ -178,7 +178,12 @@ def _write(result: Estimate, check: Check, out: Path, report: Path | None, comma
     draft = report.with_name(f".{report.name}.draft")
     try:
         write_report(
-            result, draft, truth=truth, command=command, title=f"{result.observer}: {Path(result.log.source).name}"
+            result,
+            draft,
+            truth=truth,
+            command=command,
+            check=check,
+            title=f"{result.observer}: {Path(result.log.source).name}",
         )
         save_estimate(result, out, extra)
         draft.replace(report)

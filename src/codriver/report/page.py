@@ -22,6 +22,7 @@ from codriver.report.tables import text
 from codriver.report.words import how_to_read, subject, what
 from codriver.signals import Log
 from codriver.summary import summarise
+from codriver.trust import Check
 
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 HEAD = (
@@ -36,11 +37,13 @@ _HINT = (
 )
 
 
-def page(estimate: Estimate, title: str | None, truth: Log | None, command: str | None) -> str:
+def page(
+    estimate: Estimate, title: str | None, truth: Log | None, command: str | None, check: Check | None = None
+) -> str:
     """The report as HTML; see `codriver.report.write_report` for the arguments."""
     start = float(estimate.time[0]) if len(estimate.grid) else 0.0
     origin = start if abs(start) > _FAR else 0.0
-    check = estimate.check()
+    check = check or estimate.check()
     name = PurePath(estimate.log.source.replace("\\", "/")).name
     title = title or f"{subject(estimate)}: {name or 'recording in memory'}"
     rows = figures(estimate, summarise(estimate))

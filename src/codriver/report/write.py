@@ -10,6 +10,7 @@ from codriver.errors import UsageError
 from codriver.estimate import Estimate
 from codriver.report.page import page
 from codriver.signals import Log
+from codriver.trust import Check
 
 
 def write_report(
@@ -19,6 +20,7 @@ def write_report(
     title: str | None = None,
     truth: Log | None = None,
     command: str | None = None,
+    check: Check | None = None,
 ) -> None:
     """Write an estimate as one self-contained HTML file: plots, verdict, figures, provenance.
 
@@ -31,11 +33,12 @@ def write_report(
         truth: a reference to draw and to state errors against: signals by standard names, and planned_acceleration,
             planned_jerk where the driver's plan is known.
         command: the command that made it, for the provenance.
+        check: what is found of it; by default `estimate.check()`, to which a caller may have added.
 
     Raises:
         UsageError: the file cannot be written.
     """
-    write_whole(page(estimate, title, truth, command), Path(path))
+    write_whole(page(estimate, title, truth, command, check), Path(path))
 
 
 def write_whole(content: str, target: Path) -> None:
