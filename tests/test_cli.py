@@ -113,7 +113,8 @@ class TestHelp:
     def test_every_command_has_help(self, run):
         for command in (
             (), ("demo",), ("info",), ("estimate",), ("check",), ("check", "vehicle"), ("check", "names"), ("export",),
-            ("export", "c"),
+            ("export", "c"), ("identify",), ("identify", "brake"), ("identify", "pedal"), ("identify", "ratio"), ("reproduce",),
+            ("simulate",), ("simulate", "road-test"), ("simulate", "track"), ("smooth",), ("tune",),
         ):  # fmt: skip
             ran = run(*command, "--help")
             assert ran.code == 0

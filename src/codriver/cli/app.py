@@ -76,7 +76,7 @@ def _end(number: int, frame: FrameType | None) -> None:
 def _run() -> None:
     """The application, its errors turned into messages and exit codes."""
     try:
-        app()
+        app(prog_name="codriver")
     except CodriverError as error:
         typer.secho(
             f"codriver: {_printable(str(error))}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None
