@@ -19,7 +19,7 @@ from codriver.testing import check_observer
 from conftest import constant
 
 ELLS = (1.5, 2.0, 3.0, 4.0)
-FUSED = ("intent-fused", "intent-fused-torque")
+FUSED = ("intent-fused", "fused-torque")
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off"]
 
 
@@ -177,7 +177,7 @@ class TestEstimator:
             assert ran.stdout.startswith("ok: 400 rows")
 
     @pytest.mark.parametrize(
-        ("fused", "plain"), [("intent-fused", "intent-pedals"), ("intent-fused-torque", "intent-torque")]
+        ("fused", "plain"), [("intent-fused", "intent-pedals"), ("fused-torque", "intent-torque")]
     )
     def test_known_input_is_the_papers(self, fused, plain, car, demo):
         """But for pressure below the brake's threshold, which (10a) takes for a force that the driver did not ask for."""

@@ -18,11 +18,11 @@ from drives import onto, rms, table
 import codriver as cd
 from codriver.observers import pedals_only
 from codriver.program import Program
+from codriver.simulate import PEDAL_NOISE_LEVELS as LEVELS
 from codriver.simulate import STYLES, measured_log, road_test
 from codriver.simulate.drive import Trace
 from codriver.simulate.road_test import ROAD_TEST_SENSORS
 
-LEVELS = ((0.001, 0.05e5), (0.005, 0.15e5), (0.01, 0.3e5), (0.02, 0.6e5))  # of the pedal, and of the brake, Pa
 ELLS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 CORNERS = (0.3, 0.5, 0.8, 1.2, 2.0, 4.0)  # f_D of pedals-only, Hz
 FUSED = (0.5, 0.7, 1.0, 1.4, 2.0, 2.5, 3.0, 4.0, 6.0)
@@ -187,16 +187,19 @@ def wrong(drives: list[Driven], car: cd.Vehicle, level: int) -> None:
     reference = cd.compile(cd.build("intent-pedals", car))
     for said, vehicle in cases.items():
         for name in ("intent-fused", "intent-pedals"):
-            program, found = cd.compile(cd.build(name, vehicle)), defaultdict(list)
+            program, found, acceleration = cd.compile(cd.build(name, vehicle)), defaultdict(list), []
             for drive in drives:
                 log = drive.logs[level]
                 like = reference.run(log)
+                e = program.run(log, start=float(like.time[0]), stop=float(like.time[-1]))
                 for truth, signal in TRUTHS.items():
                     wanted = onto(drive.truth, signal, like.time)
-                    found[truth].append(best(jerk(program, log, like), wanted, like.valid, like.grid.dt))
+                    found[truth].append(best(e.columns["intentional_jerk"], wanted, like.valid, like.grid.dt))
+                off = e.columns["intentional_acceleration"] - onto(drive.truth, "intentional_acceleration", like.time)
+                acceleration.append(rms(off[like.valid]))
             cells = [f"{np.mean(p, axis=0)[1]:.3f} at {np.mean(p, axis=0)[0]:.2f} s" for p in found.values()]
-            rows.append([said, name, *cells])
-    print(table(["wrong", "estimator", *TRUTHS], rows))
+            rows.append([said, name, *cells, f"{np.mean(acceleration):.2f}"])
+    print(table(["wrong", "estimator", *TRUTHS, "error of the acceleration, m/s^2"], rows))
 
 
 def draw(points: dict[tuple[int, str, str, float], Point], path: Path) -> None:

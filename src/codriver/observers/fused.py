@@ -5,11 +5,11 @@
 
 What the pedals ask for, a_p - o, and its rate j_p come from the filter of the pedals (`fused_pedals`) with hardly any lag.
 The rest b (slope, drag, rolling resistance, wrong parameters) is slow. It comes from the observer of the papers (`jerk`) with
-the force f of engine and brakes as its known input, and b, b' in place of a_i, j_i. Its knob is 0.7 whatever ell, for what
-is slow may lag and should be quiet.
+the force f of engine and brakes as its known input, and b, b' in place of a_i, j_i. Its knob is 1 whatever ell, the papers'
+gain as it is: what is slow may lag and should be quiet.
 
-    intent-fused          f = tau/M T_e - sigma c_b/M p_b          pedals as in 2017 eq. (23)
-    intent-fused-torque   the same                                 the requested torque in place of the accelerator
+    intent-fused   f = tau/M T_e - sigma c_b/M p_b    pedals as in 2017 eq. (23)
+    fused-torque   the same                           the requested torque in place of the accelerator
 
 The intention is that of 2017 eq. (7); the papers' observer estimates all of a_i by itself, from the accelerometer and the
 speed, and so lags all of it.
@@ -31,7 +31,7 @@ from codriver.observers.observer import Observer, Output, Scalars
 from codriver.observers.scaled_gain import Preset, design_scaled_gain
 from codriver.vehicles import Vehicle
 
-REST_ELL = 0.7
+REST_ELL = 1.0
 _REST = (
     Output("longitudinal_speed", "m/s", "estimate", "v"),
     Output("rest_acceleration", "m/s^2", "estimate", "b"),
@@ -39,7 +39,8 @@ _REST = (
     Output("rest_jerk", "m/s^3", "estimate", "b'"),
 )
 _PARTS = ("acceleration", "jerk")
-_BAND = Output("pedal_innovation_sd", "m/s^2", "innovation_sd", "standard deviation of pedal_innovation")
+# Of role "input", not "innovation": a quick foot is many times its band for a moment, and no fault that check() should name.
+_BAND = Output("pedal_innovation_sd", "m/s^2", "input", "standard deviation of pedal_innovation")
 
 
 def fused_observer(
@@ -71,7 +72,7 @@ def fused_observer(
         """One tick: the pedals, the rest, and their sum."""
         new, pedals = front.step(carry, u, y, ok, rho)
         given = {**{name: pedals[name] for name in rest.inputs}, "known_input": pedals["force"]}
-        more, slow = rest.step(carry, given, y, ok, rho)
+        more, slow = rest.step({key: carry[f"rest_{key}"] for key in rest.carry}, given, y, ok, rho)
         moving = negate(slow["standstill"])
         e, s = pedals["pedal_innovation"], pedals["pedal_innovation_variance"]
         counts = both(both(pedals["pedal_used"], pedals["pedal_settled"]), moving)
@@ -84,7 +85,9 @@ def fused_observer(
             out[f"{name}_sd"] = sqrt(sd * sd + more_sd * more_sd + factor * pedals[f"pedal_{part}_variance"])
         out[_BAND.name] = sqrt(factor * s)
         out["valid"] = both(slow["valid"], pedals["pedal_settled"])
-        return {**new, **more, **learnt}, {o.name: out[o.name] for o in all_outputs}
+        return {**new, **{f"rest_{key}": more[key] for key in rest.carry}, **learnt}, {
+            o.name: out[o.name] for o in all_outputs
+        }
 
     sds = tuple(Output(f"{o.name}_sd", o.unit, "sd", f"standard deviation of {o.name}") for o in outputs)
     inner = {f"{o.name}{end}" for o in _REST for end in ("", "_sd")}
@@ -96,7 +99,8 @@ def fused_observer(
     )  # fmt: skip
     return Observer(
         "fused", dt, front.inputs, (*rest.measured, *front.measured),
-        {**front.carry, **rest.carry, **fused_noise.initial_lean()}, all_outputs, step,
+        {**front.carry, **{f"rest_{key}": value for key, value in rest.carry.items()}, **fused_noise.initial_lean()},
+        all_outputs, step,
         optional=front.optional,
         settings={
             **front.settings, "form": form, "ell": ell, "dt": dt, "delay_s": round(pedal_delay(gain), 6),

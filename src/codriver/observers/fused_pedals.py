@@ -52,8 +52,8 @@ OUTPUTS = (
     Output("force", "m/s^2", "input", "what engine and brakes do, per mass"),
     Output("known_input", "m/s^2", "input", "u: what the powertrain adds to the driver's intention"),
     *FLAGS,
-    Output("pedal_innovation", "m/s^2", "innovation", "what the pedals ask for less predicted; 0 where none arrived"),
-    Output("pedal_innovation_variance", "m^2/s^4", "innovation_sd", "its variance by the filter"),
+    Output("pedal_innovation", "m/s^2", "input", "what the pedals ask for less predicted; 0 where none arrived"),
+    Output("pedal_innovation_variance", "m^2/s^4", "input", "its variance by the filter"),
     Output("pedal_used", "1", "flag", "1 where a pedal value was used"),
 )
 

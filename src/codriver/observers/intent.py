@@ -4,12 +4,12 @@
 |---------------|-----------------------------------------------|-----------------|
 | intent-pedals | pedals, brake pressure, engine torque, gear   | yes             |
 | intent-torque | requested and actual torque, gear             | yes             |
-| intent-fused  | that of intent-pedals; the pedals' rate too   | yes             |
-| intent-fused-torque | that of intent-torque; the request's rate too | yes       |
+| intent-fused  | as intent-pedals, and the pedals' rate        | yes             |
+| fused-torque  | as intent-torque, brakes, and their rate      | yes             |
 | kinematic     | none: the vehicle's own jerk                  | no              |
 | pedals-only   | pedals and gear, no observer                  | yes             |
 
-The three with an observer take the noise of the 2017 paper. `intent-torque` is of the 2015 paper; the preset "bisoffi2015"
+Those with an observer take the noise of the 2017 paper. `intent-torque` is of the 2015 paper; the preset "bisoffi2015"
 gives that paper's noise and ell.
 """
 
@@ -68,7 +68,7 @@ def _intent_fused(vehicle: Vehicle | None, design: Design) -> Observer:
     return _fused(vehicle, design, torque=False)
 
 
-def _intent_fused_torque(vehicle: Vehicle | None, design: Design) -> Observer:
+def _fused_torque(vehicle: Vehicle | None, design: Design) -> Observer:
     return _fused(vehicle, design, torque=True)
 
 
@@ -100,13 +100,13 @@ register(Estimator(
     FAMILY, _intent_fused, DEFAULT_PRESET, knob=True,
 ))  # fmt: skip
 register(Estimator(
-    "intent-fused-torque", ("mass", "transmission", "brake_coefficient"),
+    "fused-torque", ("mass", "transmission", "brake_coefficient"),
     (
         "engine_torque_request", "brake_pressure", "engine_torque", "gear", "longitudinal_acceleration",
         "longitudinal_speed",
     ),
     "the same as intent-torque with less lag: the request's rate at once, the observer for the rest",
-    FAMILY, _intent_fused_torque, DEFAULT_PRESET, knob=True,
+    FAMILY, _fused_torque, DEFAULT_PRESET, knob=True,
 ))  # fmt: skip
 register(Estimator(
     "kinematic", (), ("longitudinal_acceleration", "longitudinal_speed"),
