@@ -176,9 +176,7 @@ class TestEstimator:
             assert ran.returncode == 0, ran.stdout
             assert ran.stdout.startswith("ok: 400 rows")
 
-    @pytest.mark.parametrize(
-        ("fused", "plain"), [("intent-fused", "intent-pedals"), ("fused-torque", "intent-torque")]
-    )
+    @pytest.mark.parametrize(("fused", "plain"), [("intent-fused", "intent-pedals"), ("fused-torque", "intent-torque")])
     def test_known_input_is_the_papers(self, fused, plain, car, demo):
         """But for pressure below the brake's threshold, which (10a) takes for a force that the driver did not ask for."""
         ours, theirs = (cd.compile(cd.build(name, car)).run(demo.measured) for name in (fused, plain))
