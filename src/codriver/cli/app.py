@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from codriver import __version__
-from codriver.cli import check, demo, estimate, export, identify, info, reproduce, simulate, smooth, tune
+from codriver.cli import check, demo, estimate, export, identify, info, reproduce, simulate, smooth, style, tune
 from codriver.errors import CodriverError
 
 app = typer.Typer(
@@ -31,6 +31,7 @@ app.command("info")(info.info)
 app.command("estimate")(estimate.estimate)
 app.command("reproduce")(reproduce.reproduce)
 app.command("smooth")(smooth.smooth)
+app.command("style")(style.style)
 app.command("tune")(tune.tune)
 app.add_typer(check.app, name="check")
 app.add_typer(identify.app, name="identify")
