@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as json_module
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -153,6 +154,9 @@ def ratio(
                         f"gear {gear}: tau is {share:.2f} times engine speed over speed, 0.8 to 1 is right: is M right?",
                     )
                 )
+        found = found or [
+            ("ok", "every gear that was driven is told, and agrees with the engine's speed where there is one")
+        ]
         told = {
             "coefficients": {
                 f"tau/M gear {g.gear}": {"value": g.ratio, "sd": g.sd, "sd_newey_west": g.sd_hac, "unit": "1/(kg*m)"}
@@ -198,7 +202,7 @@ def _run(
     try:
         if draft is not None:
             write_document(document, draft)
-        save_vehicle(new, out, overwrite=overwrite)
+        save_vehicle(replace(new, name=out.stem), out, overwrite=overwrite)
         if draft is not None and report is not None:
             draft.replace(report)
     finally:

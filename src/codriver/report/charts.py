@@ -97,7 +97,7 @@ def _axes(layout: dict[str, Any], plot: Plot, left: str, right: str, domain: lis
     }  # fmt: skip
     layout[f"yaxis{left[1:]}"] = common | {
         "title": {"text": plot.y_label, "standoff": 6}, "gridcolor": "#e4e4e4",
-        **({"type": "log"} if plot.log else {}),
+        **({"type": "log", "dtick": _decades(plot)} if plot.log else {}),
         **({"range": list(np.log10(plot.limits)) if plot.log else list(plot.limits)} if plot.limits else {}),
     }  # fmt: skip
     if plot.right_label:
@@ -105,6 +105,12 @@ def _axes(layout: dict[str, Any], plot: Plot, left: str, right: str, domain: lis
             "title": {"text": plot.right_label, "standoff": 6}, "overlaying": left, "side": "right", "showgrid": False,
             "tickmode": "auto",
         }  # fmt: skip
+
+
+def _decades(plot: Plot) -> float | str:
+    """Ticks of a logarithmic axis: at 1, 2 and 5 of a decade, or at each decade where there are many."""
+    drawn = np.concatenate([c.y[np.isfinite(c.y) & (c.y > 0)] for c in plot.curves]) if plot.curves else np.ones(1)
+    return 1.0 if drawn.size and drawn.max() > 100 * drawn.min() else "D2"
 
 
 def _traces(curve: Curve, color: str, axis: str, legend: str) -> list[dict[str, Any]]:

@@ -98,7 +98,7 @@ def brake_document(fit: BrakeFit, old: Vehicle, command: str = "") -> Document:
     """The report of `identify_brake`."""
     before = "-" if fit.rmse_old is None else f"{fit.rmse_old:.4f}"
     quality = Table(
-        ("RMSE on the validation half", "m/s^2"),
+        ("RMSE on the validation half", "m/s²"),
         (("these coefficients", f"{fit.rmse:.4f}"), ("the old ones, with the best offset", before),
          ("a constant", f"{fit.rmse_constant:.4f}")),
     )  # fmt: skip
@@ -121,7 +121,8 @@ def brake_document(fit: BrakeFit, old: Vehicle, command: str = "") -> Document:
                 f"Neighbouring residuals are alike, so they count for less than their number. Standard errors come from drawing "
                 f"{fit.blocks} blocks of {fit.block:.2f} s again and again; Newey and West's formula is the check.",
                 Table(("coefficient", "unit", "sd, block bootstrap", "sd, Newey-West", "sd with that of M and tau"), tuple(
-                    (c.name, c.unit, c.sd, c.sd_hac, c.sd_total) for c in fit.coefficients.values()
+                    (c.name, _SHOWN[c.name][0], *(sd * _SHOWN[c.name][1] for sd in (c.sd, c.sd_hac, c.sd_total)))
+                    for c in fit.coefficients.values()
                 )),
             )),
             Section("What was used", (_masks(fit.share, fit.used_share, REASONS),)),
@@ -171,7 +172,7 @@ def ratio_document(fit: RatioFit, old: Vehicle | None, command: str = "") -> Doc
     parts: tuple[str | Table | Findings, ...] = (
         Table(HEAD, tuple(ratio_rows(fit, old)), "tau is the ratio times M."),
         Findings(tuple(("warn", f"gear {gear} is refused: {why}") for gear, why in fit.refused.items())),
-        f"RMS of the fit {fit.residual:.4f} m/s^2 on {fit.seconds / 60:.1f} min with the brake released.",
+        f"RMS of the fit {fit.residual:.4f} m/s² on {fit.seconds / 60:.1f} min with the brake released.",
         "The accelerometer's gain error, mostly pitch, cannot be told on roads so level: it is in the ratios."
         if fit.gain is None
         else f"The accelerometer's gain error is taken out: {fit.gain[0]:.1%}, standard error {fit.gain[1]:.1%}.",
@@ -215,7 +216,7 @@ def validation_chart(fit: BrakeFit) -> Chart:
     ]
     return Chart(
         "Figure 1: measured [y1]_F and modelled a_ID, validation half", "time (s)",
-        (Plot("acceleration (m/s^2)", (
+        (Plot("acceleration (m/s²)", (
             Curve("[y1]_F, accelerometer", time, rows.y[part], "#1a1a1a"),
             Curve("a_ID, from torque, pressure and speed", time, fit.model[part], "#C84C00"),
         ), 300, (0.0,)),),
@@ -243,7 +244,7 @@ def learning_chart(fit: BrakeFit) -> tuple[Chart | str, ...]:
                 Curve("c_b and 95 % interval", minutes, value * factor, low=(value - 1.96 * sd) * factor,
                       high=(value + 1.96 * sd) * factor),
             ), 240, (0.95 * final, 1.05 * final), limits=(0.85 * final, 1.15 * final)),
-            Plot("RMSE (m/s^2)", (Curve("validation RMSE", minutes, rmse, "#007A5A"),), 160,
+            Plot("RMSE (m/s²)", (Curve("validation RMSE", minutes, rmse, "#007A5A"),), 160,
                  limits=(0.0, 3 * float(rmse[-1]))),
         ),
         "Dotted: 5 % around the final value. Where c_b has come to rest within them, more data of the same kind would add little.",
