@@ -771,7 +771,7 @@ class TestCommand:
         assert "--overwrite" in err
         assert out.read_text() == "mine"
         assert run(*arguments, "--overwrite")[0] == 0
-        assert cd.load_vehicle(out).name == "bisoffi2017"
+        assert cd.load_vehicle(out).name == "v"
 
     @pytest.mark.parametrize(
         ("options", "words"),
