@@ -77,9 +77,9 @@ def test_step_on_floats():
     assert float(carry["s"]) == wanted[0][0]
 
 
-@pytest.mark.parametrize("bad", [casadi.exp, casadi.sin, casadi.tanh, lambda x: casadi.fmin(x, 1.0)])
+@pytest.mark.parametrize("bad", [casadi.erf, casadi.asinh, casadi.erfinv])
 def test_inexact_operations_are_refused(bad):
-    with pytest.raises(KernelError, match="only exact operations"):
+    with pytest.raises(KernelError, match="exact or made of exact ones"):
         record("bad", lambda c, u: ({}, {"y": bad(u["x"])}), [], ["x"])
 
 

@@ -14,11 +14,11 @@ static int same(double got, double want)
     return memcmp(&got, &want, sizeof got) == 0 || (got != got && want != want);
 }"""
     else:
-        compare = f"""/* Single precision: off by at most {tolerance:g} of the larger of 1 and the value. */
+        compare = f"""/* Single precision: off by at most {tolerance:g} of the larger of 1 and the value; a NaN equals a NaN. */
 static int same(double got, double want)
 {{
     const double scale = fabs(want) > 1.0 ? fabs(want) : 1.0;
-    return fabs(got - want) <= {tolerance!r} * scale;
+    return got == want || fabs(got - want) <= {tolerance!r} * scale || (got != got && want != want);
 }}"""
     return f"""/* Runs {name} over golden vectors. Returns 0 and prints "ok" if every output is right. */
 #include "{name}.h"

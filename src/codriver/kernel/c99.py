@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from math import isfinite, isnan
 
 from codriver.kernel.record import Recorded
 
@@ -47,7 +48,9 @@ def print_body(recorded: Recorded, real: str = "double") -> Body:
 
 
 def number(value: float, real: str) -> str:
-    """A constant: the shortest decimal that reads back exactly; with f in float."""
+    """A constant: the shortest decimal that reads back exactly; with f in float; math.h's names for what is not finite."""
+    if not isfinite(value):
+        return "NAN" if isnan(value) else "INFINITY" if value > 0 else "-INFINITY"
     return repr(float(value)) + ("f" if real == "float" else "")
 
 

@@ -20,7 +20,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from codriver.kernel.record import Instruction, Recorded
+from codriver.kernel.record import Recorded
+from codriver.kernel.terms import Instruction
 
 RunFunction = Callable[[int, int, int, int], None]
 

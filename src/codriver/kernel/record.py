@@ -3,35 +3,25 @@
     record(name, step, carry, inputs) -> Recorded
 
 calls the step once on CasADi's symbols and turns CasADi's instruction list into static single assignment: every
-instruction has one result, operands are earlier results. The printers (`llvm`, `c99`) go through that list line by line.
-CasADi's own interpreter runs the same function and is their referee.
+instruction has one result, operands are earlier results. Elementary functions in it (sin, exp, ...) are replaced by exact
+operations (`lower`). The printers (`llvm`, `c99`) go through that list line by line. CasADi's own interpreter runs the same
+operations and is their referee.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from codriver.errors import KernelError
 from codriver.kernel.expressions import Scalar
+from codriver.kernel.lower import FUNCTIONS, casadi_function, is_exact, keep_needed, lower
+from codriver.kernel.reals import DOUBLE, REALS
+from codriver.kernel.terms import Instruction
 
 StepFunction = Callable[[dict[str, Scalar], dict[str, Scalar]], tuple[dict[str, Scalar], dict[str, Scalar]]]
-
-
-@dataclass(frozen=True)
-class Instruction:
-    """One operation.
-
-    Attributes:
-        kind: "carry", "input", "constant", one of the kernel's operations, or "pick": (c ? yes : no) + 0.
-        operands: numbers of earlier instructions.
-        value: of a constant; of a carry or input, its index.
-    """
-
-    kind: str
-    operands: tuple[int, ...] = ()
-    value: float | int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +34,11 @@ class Recorded:
         inputs: names of the inputs; those in `flags` are 0 or 1.
         flags: the inputs that are flags.
         outputs: names of the outputs.
-        instructions: in order; their results are numbered by position.
+        instructions: in order, exact operations only; their results are numbered by position.
         carry_results, output_results: the instruction that holds each new carry and output.
-        function: the CasADi function: (carry, inputs) -> (carry, outputs), vectors.
+        function: the CasADi function of the step as written: (carry, inputs) -> (carry, outputs), vectors.
+        written: the instructions before elementary functions were replaced.
+        written_results: where the new carry and the outputs are among those.
     """
 
     name: str
@@ -58,6 +50,22 @@ class Recorded:
     carry_results: tuple[int, ...]
     output_results: tuple[int, ...]
     function: Any
+    written: tuple[Instruction, ...]
+    written_results: tuple[int, ...]
+
+    def printed_in(self, real: str) -> Recorded:
+        """The step as "double" or "float" computes it: elementary functions have their own operations in each."""
+        instructions, results = lower(self.written, self.written_results, REALS[real])
+        n = len(self.carry)
+        return replace(self, instructions=instructions, carry_results=results[:n], output_results=results[n:])
+
+    @cached_property
+    def referee(self) -> Any:
+        """CasADi's function of the exact operations; that of the step itself, if it has no others."""
+        if is_exact(self.written):
+            return self.function
+        results = self.carry_results, self.output_results
+        return casadi_function(self.name, self.instructions, len(self.carry), len(self.inputs), results)
 
     def fingerprint(self) -> str:
         """Sixteen hexadecimal digits that change with any operation or constant of the step."""
@@ -71,10 +79,12 @@ class Recorded:
 
 
 def _kinds() -> dict[int, str]:
-    """CasADi's operation codes that the kernel carries, all exact in IEEE arithmetic."""
+    """CasADi's operation codes that the kernel carries: exact in IEEE arithmetic, or in `FUNCTIONS`."""
     import casadi as ca
 
-    return {
+    functions = {getattr(ca, f"OP_{name.upper()}"): name for name in FUNCTIONS if name != "power"}
+    return functions | {
+        ca.OP_POW: "power", ca.OP_CONSTPOW: "power",
         ca.OP_ADD: "add", ca.OP_SUB: "sub", ca.OP_MUL: "mul", ca.OP_DIV: "div", ca.OP_NEG: "neg", ca.OP_SQRT: "sqrt",
         ca.OP_SQ: "square", ca.OP_TWICE: "twice", ca.OP_INV: "inverse", ca.OP_FABS: "abs", ca.OP_LT: "lt", ca.OP_LE: "le",
         ca.OP_EQ: "eq", ca.OP_NE: "ne", ca.OP_NOT: "not", ca.OP_AND: "and", ca.OP_OR: "or", ca.OP_IF_ELSE_ZERO: "where",
@@ -95,7 +105,7 @@ def record(
         flags: those of the inputs that are 0 or 1.
 
     Returns:
-        the step; carried scalars that no output depends on are left out.
+        the step; carried scalars that no output depends on are left out, elementary functions are exact operations.
 
     Raises:
         KernelError: the step returns another carry than it takes, or uses an operation the kernel does not carry.
@@ -118,10 +128,14 @@ def record(
     results = ca.vertcat(*[ca.SX(list(new.values())[k]) for k in kept]), ca.vertcat(*[ca.SX(v) for v in out.values()])
     taken = ca.vertcat(ca.SX(0, 1), *[state[k] for k in kept])
     function = ca.Function(name, [taken, given], ca.cse(list(results)), ["carry", "input"], ["carry_next", "output"])
-    instructions, targets = _drop_unused(*_fuse_selects(*_assign_once(name, function)))
+    once, targets = _assign_once(name, function)
+    wanted = [targets[0, k] for k in range(len(kept))] + [targets[1, k] for k in range(len(out))]
+    written, written_places = keep_needed(_fuse_selects(once), wanted)
+    instructions, places = lower(written, written_places, DOUBLE)
+    new_places, out_places = places[: len(kept)], places[len(kept) :]
     return Recorded(
-        name, tuple(carry[k] for k in kept), tuple(inputs), frozenset(flags), tuple(out), tuple(instructions),
-        tuple(targets[0, k] for k in range(len(kept))), tuple(targets[1, k] for k in range(len(out))), function,
+        name, tuple(carry[k] for k in kept), tuple(inputs), frozenset(flags), tuple(out), instructions, new_places,
+        out_places, function, written, written_places,
     )  # fmt: skip
 
 
@@ -155,8 +169,8 @@ def _assign_once(name: str, function: Any) -> tuple[list[Instruction], dict[tupl
         if kind is None:
             raise KernelError(
                 f"the step of '{name}' uses CasADi's operation {code}",
-                f"only exact operations: {', '.join(sorted(set(kinds.values())))}",
-                "write it with those; exp, sin and their like differ between libraries in the last bit",
+                f"only operations that are exact or made of exact ones: {', '.join(sorted(set(kinds.values())))}",
+                "write it with those; others differ between libraries in the last bit",
             )
         reads, writes = function.instruction_input(k), function.instruction_output(k)
         if kind == "output":
@@ -187,9 +201,7 @@ def _assign_once(name: str, function: Any) -> tuple[list[Instruction], dict[tupl
     return instructions, targets
 
 
-def _fuse_selects(
-    instructions: list[Instruction], targets: dict[tuple[int, int], int]
-) -> tuple[list[Instruction], dict[tuple[int, int], int]]:
+def _fuse_selects(instructions: list[Instruction]) -> list[Instruction]:
     """CasADi writes a selection as (c ? yes : 0) + (!c ? no : 0). Make it one "pick": (c ? yes : no) + 0, the same bits."""
 
     def branches(first: Instruction, second: Instruction) -> tuple[int, int, int] | None:
@@ -208,29 +220,12 @@ def _fuse_selects(
             if found:
                 instruction = Instruction("pick", found)
         fused.append(instruction)
-    return fused, targets
-
-
-def _drop_unused(
-    instructions: list[Instruction], targets: dict[tuple[int, int], int]
-) -> tuple[list[Instruction], dict[tuple[int, int], int]]:
-    """Keep what a result needs, renumbered."""
-    needed = set(targets.values())
-    for number in range(len(instructions) - 1, -1, -1):
-        if number in needed:
-            needed.update(instructions[number].operands)
-    place: dict[int, int] = {}
-    kept: list[Instruction] = []
-    for number, instruction in enumerate(instructions):
-        if number in needed:
-            place[number] = len(kept)
-            kept.append(Instruction(instruction.kind, tuple(place[i] for i in instruction.operands), instruction.value))
-    return kept, {key: place[number] for key, number in targets.items()}
+    return fused
 
 
 def interpret(
     recorded: Recorded, carry: Mapping[str, float], inputs: Mapping[str, float]
 ) -> tuple[list[float], list[float]]:
     """One step by CasADi's own interpreter: the referee of the printers."""
-    new, out = recorded.function([carry[key] for key in recorded.carry], [inputs[key] for key in recorded.inputs])
+    new, out = recorded.referee([carry[key] for key in recorded.carry], [inputs[key] for key in recorded.inputs])
     return [float(x) for x in new.full().ravel()], [float(x) for x in out.full().ravel()]
