@@ -109,8 +109,9 @@ def _table(mean: Mean) -> Table:
         ("truth", "estimator", "ell", "error of the moment", "zero", "best correlation", "at lag, s",
          "lag taken out", "zero", "inside shifts", "zero", "and 1 s after", "zero"),
         rows,
-        "Jerk, m/s³ rms, mean over the drives, on the ticks where all estimators are valid. pedals-only has no observer, so "
-        "there is no lag to take out; the truth of the model is made from the same pedals, which flatters it.",
+        "Jerk, m/s³ rms, mean over the drives, on the ticks where all estimators are valid. No ideal "
+        "signals lag as pedals-only and intent-fused do, so their lag cannot be taken out; the truth of the model is made from "
+        "the same pedals, which flatters both.",
     )  # fmt: skip
 
 

@@ -11,7 +11,8 @@ and the best correlation with the truth over lags from 0 to 2 s, with the lag wh
 the intention as the model defines it ("model"), and the driver's plan ("plan"), which knows nothing of gears and pedals. All
 estimators are judged on the same ticks: those where every one of them is valid.
 
-`pedals-only` has no observer, so nothing is there to match; it is judged by moment and correlation alone.
+`pedals-only` has no observer, and no ideal signals lag as the fused estimators do, so nothing is there to match; they are
+judged by moment and correlation alone.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ TRUTHS: Mapping[Truth, tuple[str, str]] = {
 AFTER = 1.0  # a shift counts from its start to this many seconds after its end
 LONGEST_LAG, LAG_STEP = 2.0, 0.02  # s
 KNOBLESS = "pedals-only"
+UNMATCHED = (KNOBLESS, "intent-fused", "fused-torque")
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ class Score:
         estimator, ell, truth: what was judged against what; ell None where there is no knob.
         moment, zero: error against the truth of the moment, and that of answering zero.
         correlation, lag: the best correlation with the truth, and the lag where it is reached, s.
-        matched, matched_zero: with the lag taken out, and that of answering zero; None without an observer.
+        matched, matched_zero: with the lag taken out, and that of answering zero; None where nothing can be matched.
         shifts, shifts_zero: the same inside gear shifts.
         around, around_zero: the same inside gear shifts and in the second after each.
     """
@@ -112,7 +114,7 @@ def compare(estimates: Mapping[tuple[str, float | None], Estimate], truth: Log) 
             ours = jerk_of(estimate)
             correlation, lag = best_lag(ours, moment, use, first.grid.dt)
             score = Score(name, ell, of, rms((ours - moment)[use]), rms(moment[use]), correlation, lag)
-            if name != KNOBLESS:
+            if name not in UNMATCHED:
                 if ell not in matched:
                     matched[ell] = delay_matched(estimate, truth, acceleration).columns["intentional_jerk"]
                 wanted = matched[ell]
