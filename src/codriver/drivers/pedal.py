@@ -41,7 +41,7 @@ def pedal_reversals(estimate: Estimate, gap: float = GAP) -> npt.NDArray[np.intp
 def reversals(pedal: Array, gap: float) -> npt.NDArray[np.intp]:
     """Indices at which the movement of a pedal turns, shape (m,); samples that are no numbers leave it where it was."""
     held = with_play(pedal, gap)
-    moved = np.diff(held, prepend=held[:1])
+    moved = np.nan_to_num(np.diff(held, prepend=held[:1]))
     at = np.flatnonzero(moved)
     if at.size == 0:
         return at

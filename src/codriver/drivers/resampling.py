@@ -52,7 +52,7 @@ def interval(statistic: Callable[[Array], Array], sums: Array, weights: Array | 
     """A statistic of sums over blocks, with its interval.
 
     Args:
-        statistic: of total sums, shape (m, k), one number each, shape (m,); NaN where it is not defined.
+        statistic: of total sums, shape (m, k), one number each, not negative, shape (m,); NaN where it is not defined.
         sums: over the blocks, shape (blocks, k).
         weights: from `draws`.
     """
@@ -61,8 +61,13 @@ def interval(statistic: Callable[[Array], Array], sums: Array, weights: Array | 
     if blocks < FEWEST or not np.isfinite(value):
         return Interval(value)
     again = statistic((draws(blocks) if weights is None else weights) @ sums)
-    low, high = around(value, again, blocks)
-    return Interval(value, low, high)
+    if value <= 0:
+        return Interval(value, *around(value, again, blocks))
+    # A positive number is widened by a factor, so that its interval stays positive.
+    low, high = around(0.0, np.log(np.maximum(again, 1e-9 * value) / value), blocks)
+    if low is None or high is None:
+        return Interval(value)
+    return Interval(value, float(value * np.exp(low)), float(value * np.exp(high)))
 
 
 def around(value: float, again: Array, blocks: int) -> tuple[float | None, float | None]:
