@@ -79,6 +79,22 @@ _ENTRIES = (
     Quantity(
         "steering_wheel_torque", "N*m", "N*m", "T_s", "torque in the steering column, positive to the left", -100, 100
     ),
+    Quantity(
+        "steering_motor_torque",
+        "N*m",
+        "N*m",
+        "T_m",
+        "torque of the force-feedback or assist motor on the steering column, positive to the left",
+        -100,
+        100,
+    ),
+    Quantity(
+        "steering_motor_command",
+        "1",
+        "1",
+        "T_com",
+        "what that motor is told, in the device's own unit; torque = torque_scale times it + torque_offset",
+    ),
     Quantity("steer_angle", "rad", "deg", "delta", "angle of the steered wheel or fork, positive to the left", -pi, pi),
     Quantity("steer_rate", "rad/s", "deg/s", "omega", "rate of the steered wheel or fork", -40, 40),
     Quantity(

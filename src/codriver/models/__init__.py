@@ -2,5 +2,6 @@
 
 from codriver.models.longitudinal import intention_model
 from codriver.models.state_space import StateSpace
+from codriver.models.steering import steering_model
 
-__all__ = ["StateSpace", "intention_model"]
+__all__ = ["StateSpace", "intention_model", "steering_model"]

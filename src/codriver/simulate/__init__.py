@@ -13,6 +13,7 @@ Its parameters are its own: an estimator never shares them, and may be wrong abo
     route, track            a road of 53 km with named stretches, and a closed track
     road_test               42 minutes, and two laps, of all this
     folder, drive_files     files, written whole or not at all
+    steering                a steering wheel that its motor turns
 """
 
 from codriver.simulate.bus import BusParameters, Hole, drop_outs
@@ -24,6 +25,7 @@ from codriver.simulate.folder import refuse_foreign
 from codriver.simulate.road_test import ROAD_TEST_SENSORS, RoadTest, road_test, track_test
 from codriver.simulate.route import ROAD_TEST_STRETCHES, Stretch, road_test_road
 from codriver.simulate.sensors import PEDAL_NOISE_LEVELS, SensorParameters, measured_log
+from codriver.simulate.steering import SETTINGS, Wheel, WheelNoise, WheelRuns, WheelSetting, simulate_wheel
 from codriver.simulate.styles import STYLES, Style
 from codriver.simulate.track import track_road
 from codriver.simulate.truth import ideal_signals, truth_log
@@ -35,6 +37,7 @@ __all__ = [
     "ROAD_TEST_SENSORS",
     "ROAD_TEST_STRETCHES",
     "ROLLING_RADIUS_2015",
+    "SETTINGS",
     "STYLES",
     "BusParameters",
     "CarParameters",
@@ -47,6 +50,10 @@ __all__ = [
     "Stretch",
     "Style",
     "Trace",
+    "Wheel",
+    "WheelNoise",
+    "WheelRuns",
+    "WheelSetting",
     "demo_drive",
     "drive",
     "drop_outs",
@@ -56,6 +63,7 @@ __all__ = [
     "refuse_foreign",
     "road_test",
     "road_test_road",
+    "simulate_wheel",
     "track_road",
     "track_test",
     "truth_log",

@@ -29,4 +29,11 @@ KNOWN: dict[str, Known] = {
     "brake_threshold": Known(
         "Pa", 0, 2e6, False, "brake pressure above which the driver is braking (sigma of 2017 eq. 4)"
     ),
+    "steering_inertia": Known("kg*m^2", 1e-4, 10, False, "J_s, of the steering wheel and its column (2019 eq. 27)"),
+    "steering_damping": Known("N*m*s/rad", 0, 50, False, "b_s, of the steering wheel and its column (2019 eq. 27)"),
+    "steering_friction": Known("N*m", 0, 50, False, "T_c, Coulomb friction of the steering column"),
+    "torque_scale": Known(
+        "N*m", -1e5, 1e5, False, "torque of the steering motor per unit of its command (2019 eq. 89)"
+    ),
+    "torque_offset": Known("N*m", -100, 100, False, "torque of the steering motor at command 0 (2019 eq. 89)"),
 }
