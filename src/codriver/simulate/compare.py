@@ -109,15 +109,16 @@ def compare(estimates: Mapping[tuple[str, float | None], Estimate], truth: Log) 
     scores = []
     for of, (acceleration, jerk) in TRUTHS.items():
         moment = at(truth, jerk, first.time)
-        matched: dict[float | None, Array] = {}  # the observers of one ell have the same reference
+        matched: dict[tuple[float | None, bool], Array] = {}  # observers of one ell that miss their inputs alike share it
         for (name, ell), estimate in estimates.items():
             ours = jerk_of(estimate)
             correlation, lag = best_lag(ours, moment, use, first.grid.dt)
             score = Score(name, ell, of, rms((ours - moment)[use]), rms(moment[use]), correlation, lag)
             if name not in UNMATCHED:
-                if ell not in matched:
-                    matched[ell] = delay_matched(estimate, truth, acceleration).columns["intentional_jerk"]
-                wanted = matched[ell]
+                key = ell, name == "kinematic"  # which has no inputs to miss
+                if key not in matched:
+                    matched[key] = delay_matched(estimate, truth, acceleration).columns["intentional_jerk"]
+                wanted = matched[key]
                 score = Score(
                     name, ell, of, score.moment, score.zero, correlation, lag,
                     *(f for part in (use, inside, around) for f in (rms((ours - wanted)[part]), rms(wanted[part]))),

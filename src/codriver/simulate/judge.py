@@ -90,7 +90,9 @@ def judge(estimate: Estimate, truth: Log) -> list[Judgement]:
 def delay_matched(estimate: Estimate, truth: Log, intention: str) -> Estimate:
     """The observer's answer to ideal signals whose intention is the truth's signal `intention`, on the estimate's ticks.
 
-    The ideal signals are v and v' + o_a, at the stamps that the estimate's log has for them, and u = v' - intention.
+    The ideal signals are v and v' + o_a, at the stamps that the estimate's log has for them, and u = v' - intention. Where the
+    estimate's inputs were missing the ideal observer is told so: it then opens its gains and lags as little as the estimate
+    does, but it has the true u, so what the missing inputs do to the estimate stays an error.
 
     Raises:
         UsageError: the estimate is one of intent-fused, whose lag follows the noise of the pedals; ideal signals have none.
@@ -108,8 +110,9 @@ def delay_matched(estimate: Estimate, truth: Log, intention: str) -> Estimate:
     signals = [Signal(name, time, made[name], VOCABULARY[name].unit) for name, time in stamps.items()]
     clock = truth["longitudinal_speed"].time
     known = truth["longitudinal_acceleration"].values - truth[intention].values
-    for name, values in (("known_input", known), ("direction", 1.0 + 0 * known), ("inputs_known", 1.0 + 0 * known)):
-        signals.append(Signal(name, clock, values, ""))
+    signals += [Signal("known_input", clock, known, ""), Signal("direction", clock, 1.0 + 0 * known, "")]
+    there = estimate.columns.get("inputs_known", np.ones(len(estimate.grid)))
+    signals.append(Signal("inputs_known", estimate.time, there, ""))
     design = design_scaled_gain(preset_of(settings), estimate.grid.dt, float(settings["ell"]))
     program = compile(jerk_observer(design, settings["form"], INTENTION, "ideal"))
     grid = Log.of(signals, "ideal signals").sample(
