@@ -7,6 +7,7 @@ python docs/measure/elementary.py [points]       points a function and a range, 
 from __future__ import annotations
 
 import math
+import re
 import shutil
 import subprocess
 import sys
@@ -144,10 +145,14 @@ def speed() -> str:
     rng = np.random.default_rng(5)
     n = 200_000
     x, y = rng.uniform(0.1, 3, n), rng.uniform(0.1, 3, n)
-    for name in ("sin", "exp", "log", "tanh", "atan2", "power"):
-        step = recorded(name)
-        libm = {"power": "pow"}.get(name, name)
-        call = f"{libm}(in->x, in->y)" if name in TWO else f"{libm}(in->x)"
+    cases = {f"{n}(x)": recorded(n) for n in ("sin", "exp", "log", "tanh")}
+    cases |= {"atan2(x, y)": recorded("atan2"), "pow(x, y)": recorded("power")}
+    friction = record(
+        "f", lambda c, u: ({}, {"value": ca.sin(u["x"]) + ca.cos(u["x"]) * ca.tanh(u["y"])}), [], ["x", "y"]
+    )
+    cases["sin(x) + cos(x) * tanh(y)"] = friction
+    for written, step in cases.items():
+        call = re.sub(r"\b([xy])\b", r"in->\1", written)
         times = []
         for body in ("\n".join(print_body(step).lines), f"out->value = {call};"):
             with tempfile.TemporaryDirectory() as folder:
@@ -161,8 +166,12 @@ def speed() -> str:
                 )
                 times.append(float(said.stdout))
         compiled = compile_loop(step)
-        rows.append([name, f"{times[0]:.0f}", f"{times[1]:.0f}", f"{loop_time(compiled, x, y):.0f}"])
-    return table(["function", "exact operations, C, ns", "libm, C, ns", "exact operations, LLVM, ns"], rows)
+        rows.append(
+            [written, str(step.operations()), f"{times[0]:.0f}", f"{times[1]:.0f}", f"{loop_time(compiled, x, y):.0f}"]
+        )
+    return table(
+        ["in a step", "operations", "exact operations, C, ns", "libm, C, ns", "exact operations, LLVM, ns"], rows
+    )
 
 
 def loop_time(compiled: object, x: np.ndarray, y: np.ndarray) -> float:

@@ -29,7 +29,7 @@ def exponential(real: Real, x: Term) -> Term:
 def exponential_less_one(real: Real, x: Term) -> Term:
     """e^x - 1, with all its digits near 0."""
     far = float(real.bits)
-    near = _less_one(real, pick(abs(x) < far, x, 0.0), -2 * real.bits)
+    near, _ = _less_one(real, pick(abs(x) < far, x, 0.0), -2 * real.bits)
     return pick(x <= -far, -1.0, pick(x < far, near, exponential(real, x)))
 
 
@@ -37,8 +37,11 @@ def hyperbolic_tangent(real: Real, x: Term) -> Term:
     """The hyperbolic tangent; never beyond 1, and 1 from where that is nearest."""
     far = float(ceil((real.bits + 3) * _LN2 / 2.0))
     size = abs(x)
-    q = _less_one(real, 2.0 * pick(size > far, far, size), 0)
-    value = q / (q + 2.0)
+    q, q_rest = _less_one(real, 2.0 * pick(size > far, far, size), 0)
+    below = q + 2.0
+    ratio = q / below
+    # Put right by what rounding took from q, above and below the line; 2 - below + q is what it took from the sum.
+    value = ratio + (q_rest - ratio * (((2.0 - below) + q) + q_rest)) / below
     return pick(x < 0.0, -value, value)
 
 
@@ -46,7 +49,7 @@ def hyperbolic_sine(real: Real, x: Term) -> Term:
     """The hyperbolic sine."""
     size = abs(x)
     far = real.bits / 2.0
-    q = _less_one(real, pick(size < far, size, 0.0), 0)
+    q, _ = _less_one(real, pick(size < far, size, 0.0), 0)
     value = pick(size < far, 0.5 * (q + q / (q + 1.0)), _half_exponential(real, size))
     return pick(x < 0.0, -value, value)
 
@@ -84,11 +87,13 @@ def scaled(real: Real, value: Term, k: Term) -> Term:
     return value * power_of_two(inner, -half, real.top.bit_length() - 1) * outer
 
 
-def _less_one(real: Real, x: Term, lowest: int) -> Term:
-    """e^x - 1, where the whole part of x/ln 2 lies between `lowest` and 1.5 bits."""
+def _less_one(real: Real, x: Term, lowest: int) -> tuple[Term, Term]:
+    """e^x - 1 and its last rounding error, where the whole part of x/ln 2 lies between `lowest` and 1.5 bits."""
     k, high, rest = reduced(real, x)
     power = power_of_two(k, lowest, (3 * real.bits // 2 - lowest).bit_length())
-    return ((power - 1.0) + power * high) + power * rest
+    most, little = (power - 1.0) + power * high, power * rest
+    q = most + little
+    return q, (most - q) + little
 
 
 def _half_exponential(real: Real, x: Term) -> Term:

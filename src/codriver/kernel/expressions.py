@@ -1,8 +1,9 @@
-"""What a step may use beside + - * / and comparisons: exact operations only.
+"""What a step may use beside + - * /, comparisons and CasADi's functions: exact operations.
 
 A step is written once and runs twice: on CasADi's symbols, where it is recorded, and on plain floats, where it can be
 followed with a debugger. Flags are numbers, 0.0 or 1.0. Everything here is exact in IEEE 754 arithmetic, so every printer
-gives the same bits.
+gives the same bits. CasADi's own sin, exp, tanh, ... may be used too: when the step is recorded they become exact operations
+(`lower`); on plain floats they are the C library's, whose last bit may differ.
 
 `select` never looks at the value it does not choose: a NaN in the branch not taken does no harm.
 """

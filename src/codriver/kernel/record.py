@@ -19,7 +19,7 @@ from codriver.errors import KernelError
 from codriver.kernel.expressions import Scalar
 from codriver.kernel.lower import FUNCTIONS, casadi_function, is_exact, keep_needed, lower
 from codriver.kernel.reals import DOUBLE, REALS
-from codriver.kernel.terms import Instruction
+from codriver.kernel.terms import Instruction, Listing, Term
 
 StepFunction = Callable[[dict[str, Scalar], dict[str, Scalar]], tuple[dict[str, Scalar], dict[str, Scalar]]]
 
@@ -159,46 +159,44 @@ def _needed(state: Any, new: Sequence[Scalar], out: Sequence[Scalar]) -> list[in
 def _assign_once(name: str, function: Any) -> tuple[list[Instruction], dict[tuple[int, int], int]]:
     """CasADi's list, whose work vector reuses its places, as single assignments; and where each result is."""
     kinds = _kinds()
-    instructions: list[Instruction] = []
-    place: dict[int, int] = {}  # CasADi's work index -> instruction that filled it last
+    listing = Listing()
+    place: dict[int, Term] = {}  # CasADi's work index -> what filled it last
     targets: dict[tuple[int, int], int] = {}
-    known: dict[Instruction, int] = {}  # the same operation on the same operands is done once
     for k in range(function.n_instructions()):
         code = function.instruction_id(k)
         kind = kinds.get(code)
         if kind is None:
             raise KernelError(
-                f"the step of '{name}' uses CasADi's operation {code}",
+                f"the step of '{name}' uses CasADi's operation {_called(code)}",
                 f"only operations that are exact or made of exact ones: {', '.join(sorted(set(kinds.values())))}",
                 "write it with those; others differ between libraries in the last bit",
             )
         reads, writes = function.instruction_input(k), function.instruction_output(k)
         if kind == "output":
-            targets[writes[0], writes[1]] = place[reads[0]]
-            continue
-        if kind == "copy":
+            targets[writes[0], writes[1]] = place[reads[0]].place
+        elif kind == "copy":
             place[writes[0]] = place[reads[0]]
-            continue
-        if kind == "constant":
-            instruction = Instruction("constant", (), float(function.instruction_constant(k)))
+        elif kind == "constant":
+            place[writes[0]] = listing.term(function.instruction_constant(k))
         elif kind == "input":
-            instruction = Instruction("carry" if reads[0] == 0 else "input", (), int(reads[1]))
+            place[writes[0]] = listing.emit("carry" if reads[0] == 0 else "input", value=int(reads[1]))
         else:
-            instruction = Instruction(kind, tuple(place[i] for i in reads))
-        if instruction not in known:
-            known[instruction] = len(instructions)
-            instructions.append(instruction)
-        place[writes[0]] = known[instruction]
+            place[writes[0]] = listing.emit(kind, *(place[i] for i in reads))
     # An output that is identically zero is sparse in CasADi and has no instruction of its own.
     for result, width in enumerate((function.size1_out(0), function.size1_out(1))):
         for element in range(width):
             if (result, element) not in targets:
-                zero = Instruction("constant", (), 0.0)
-                if zero not in known:
-                    known[zero] = len(instructions)
-                    instructions.append(zero)
-                targets[result, element] = known[zero]
-    return instructions, targets
+                targets[result, element] = listing.term(0.0).place
+    return listing.instructions, targets
+
+
+def _called(code: int) -> str:
+    """What CasADi calls an operation."""
+    import casadi as ca
+
+    return next(
+        (name[3:].lower() for name in dir(ca) if name.startswith("OP_") and getattr(ca, name) == code), str(code)
+    )
 
 
 def _fuse_selects(instructions: list[Instruction]) -> list[Instruction]:
