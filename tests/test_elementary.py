@@ -19,6 +19,7 @@ from codriver.export import export_c
 from codriver.export.golden import golden_inputs
 from codriver.kernel import record
 from codriver.kernel.c99 import print_body
+from codriver.kernel.coefficients import NUMBERS
 from codriver.kernel.llvm import compile_loop
 from codriver.kernel.lower import FUNCTIONS
 from codriver.kernel.record import interpret
@@ -94,6 +95,14 @@ class TestAccuracy:
     @pytest.mark.parametrize("name", elementary.SMOOTH)
     def test_on_many_points(self, name, real):
         assert max(elementary.worst(name, real, 10_000).values()) <= 2.0
+
+    @pytest.mark.slow
+    def test_the_numbers_are_the_scripts(self):
+        """The polynomials and constants are those that docs/measure/elementary_fit.py finds."""
+        script = ROOT / "docs" / "measure" / "elementary_fit.py"
+        found: dict = {}
+        exec(subprocess.run([sys.executable, script], capture_output=True, text=True, check=True).stdout, found)
+        assert found["NUMBERS"] == NUMBERS
 
     @pytest.mark.parametrize("name", ["exp", "log", "sin", "atan", "tanh", "log1p", "expm1"])
     def test_subnormal_arguments_and_results(self, name):

@@ -5,8 +5,8 @@
 
 pi/2 is subtracted in four parts, three of them so short that their products with n are exact; S and C are minimax fits
 (coefficients.py). The quadrant, n modulo 4, chooses between sine and cosine and their signs. Beyond `Real.circle` (100,000
-rad in double) the answer is NaN: there the parts are too few for a right one. Source of the two sums: K. C. Ng's method, as in
-W. J. Cody and W. Waite, Software Manual for the Elementary Functions, 1980.
+rad in double) the answer is NaN: there the parts are too short for a right one. Source of the reduction: W. J. Cody and W. Waite,
+Software Manual for the Elementary Functions, 1980; of the two sums: FDLIBM (Sun Microsystems, 1993), k_sin.c and k_cos.c.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def _reduced(real: Real, x: Term) -> tuple[Term, tuple[Term, Term], tuple[Term, 
     n = nearest_integer(x * real.number("two_over_pi"), real)
     quadrant = n - 4.0 * nearest_integer(0.25 * n, real)
     first, second, third, fourth = real.numbers("half_pi_parts")
-    left = x - n * first  # exact
+    left = x - n * first  # no rounding: near n pi/2 the two agree in their first digits
     left, error2 = exact_sum(left, -(n * second))
     left, error3 = exact_sum(left, -(n * third))
     r, t = exact_sum(left, error2 + (error3 - n * fourth))
