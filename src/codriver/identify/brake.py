@@ -23,7 +23,7 @@ from codriver.errors import LogError
 from codriver.identify.brake_fit import PARAMETERS, BrakeFit, Coefficient, Refusal
 from codriver.identify.brake_rows import DriveRows, drive_rows, halves, short_name
 from codriver.identify.learning import learning_curve
-from codriver.identify.regression import Regression, regress, solve
+from codriver.identify.regression import Regression, regress, rms, solve
 from codriver.identify.standard_errors import autocorrelation
 from codriver.signals import Log
 from codriver.signals.grid import Flags
@@ -88,8 +88,8 @@ def identify_brake(
     return BrakeFit(
         coefficients, tuple(refused), tuple(offsets), bias is not None, _minutes(first, dt), _minutes(second, dt),
         _minutes(first & rows.pressed, dt), rows.share, float(rows.keep.mean()), fit.trimmed,
-        _rms(e[second]), _old(rows, force, vehicle, M, first, second),
-        _rms(rows.y[second] - rows.y[first].mean()), fit.length * dt, fit.blocks, curve, rows, model, fit.used, second,
+        rms(e[second]), _old(rows, force, vehicle, M, first, second),
+        rms(rows.y[second] - rows.y[first].mean()), fit.length * dt, fit.blocks, curve, rows, model, fit.used, second,
         np.arange(most + 1, dtype=float) * dt, autocorrelation(e, fit.used, rows.pieces, most),
         tuple(short_name(log) for log in logs),
     )  # fmt: skip
@@ -168,10 +168,10 @@ def _told_apart(X: Array, names: list[str]) -> tuple[str, str] | None:
             continue
         k = names.index(name)
         others = np.delete(X, k, axis=1)
-        size, rest = _rms(X[:, k]), 0.0
+        size, rest = rms(X[:, k]), 0.0
         if size > _NOTHING[name]:
             try:
-                rest = _rms(X[:, k] - others @ solve(others, X[:, k]))
+                rest = rms(X[:, k] - others @ solve(others, X[:, k]))
             except LogError:
                 continue  # one of the others is at fault
         if not rest > 1e-5 * size:
@@ -256,7 +256,7 @@ def _old(rows: DriveRows, force: Array, vehicle: Vehicle, M: float, first: Flags
     e = rows.y - (force - c_b * rows.pressure - drag * rows.square) / M
     log, count = rows.log_of, rows.pieces.size - 1
     mean = np.bincount(log[first], e[first], count) / np.maximum(np.bincount(log[first], minlength=count), 1)
-    return _rms(e[second] - mean[log[second]])
+    return rms(e[second] - mean[log[second]])
 
 
 def _sds(vehicle: Vehicle, name: str, count: int) -> Array:
@@ -266,10 +266,6 @@ def _sds(vehicle: Vehicle, name: str, count: int) -> Array:
 
 def _minutes(mask: Flags, dt: float) -> float:
     return float(mask.sum()) * dt / 60
-
-
-def _rms(x: Array) -> float:
-    return float(np.sqrt(np.mean(x * x))) if x.size else float("nan")
 
 
 def _named(logs: Sequence[Log]) -> str:

@@ -22,7 +22,7 @@ from codriver.errors import LogError
 from codriver.finding import Finding
 from codriver.identify.brake_rows import halves, short_name
 from codriver.identify.low_pass import centred, low_pass, rate
-from codriver.identify.regression import regress, solve
+from codriver.identify.regression import regress, rms, solve
 from codriver.identify.usable import AFTER_SHIFT, BEFORE_SHIFT, OPEN_CLUTCH, filled, inside, widened
 from codriver.signals import Grid, Log
 from codriver.signals.grid import Flags
@@ -144,9 +144,9 @@ def identify_pedal(
     half = fit.interval_factor * sd
     return PedalFit(
         c_r, sd, float(fit.sd_hac[0]), c_r - half, c_r + half, r2, offset, curvature,
-        _findings(c_r, r2, offset, curvature, fit.trimmed), _rms(e[second]),
-        None if old is None else _rms((request - old * pedal)[second]),
-        _rms(request[second] - request[first].mean()), float(first.sum()) * dt / 60, float(second.sum()) * dt / 60, share,
+        _findings(c_r, r2, offset, curvature, fit.trimmed), rms(e[second]),
+        None if old is None else rms((request - old * pedal)[second]),
+        rms(request[second] - request[first].mean()), float(first.sum()) * dt / 60, float(second.sum()) * dt / 60, share,
         float(keep.mean()), fit.trimmed, fit.length * dt, fit.blocks, pedal, request, first, second,
         tuple(short_name(log) for log in logs),
     )  # fmt: skip
@@ -225,7 +225,3 @@ def _findings(c_r: float, r2: float, offset: float, curvature: float, trimmed: f
             "warn", f"{trimmed:.0%} of the moments do not fit and were left out: cruise control, a rev limiter, another controller?"
         ))  # fmt: skip
     return tuple(found)
-
-
-def _rms(x: Array) -> float:
-    return float(np.sqrt(np.mean(x * x))) if x.size else float("nan")

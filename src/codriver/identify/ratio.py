@@ -26,7 +26,7 @@ import numpy as np
 
 from codriver.errors import LogError, UsageError
 from codriver.identify.brake_rows import DriveRows, drive_rows, short_name
-from codriver.identify.regression import Regression, regress, solve
+from codriver.identify.regression import Regression, regress, rms, solve
 from codriver.signals import Log
 from codriver.signals.signal import Array
 
@@ -217,7 +217,7 @@ def _fit(rows: DriveRows, driven: list[int], seed: int, names: str) -> tuple[Reg
         columns.append(-rows.square)
     X = np.column_stack(columns)
     apart = rows.rate[offered] - X[offered] @ solve(X[offered], rows.rate[offered])
-    if np.sqrt(np.mean(apart**2)) > LEAST_SLOPE:
+    if rms(apart) > LEAST_SLOPE:
         fit = regress(np.column_stack([X, rows.rate]), rows.y, offered, rows.pieces, seed=seed)
         if fit.sd[-1] <= GAIN_SD and fit.freedom >= LEAST_FREEDOM:
             return fit, (float(fit.solution[-1]), float(fit.sd[-1]))

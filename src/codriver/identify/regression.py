@@ -82,7 +82,7 @@ def regress(X: Array, y: Array, offered: Flags, pieces: Index, *, seed: int = 0,
     blocks = starts.size - 1
     return Regression(
         solution, np.sqrt(np.diag(covariance)), np.sqrt(np.diag(hac)), blocks - X.shape[1], used,
-        1.0 - float(used.sum() / offered.sum()), float(np.sqrt(np.mean(e[used] ** 2))), length, blocks,
+        1.0 - float(used.sum() / offered.sum()), rms(e[used]), length, blocks,
     )  # fmt: skip
 
 
@@ -126,6 +126,11 @@ def trimmed_rows(X: Array, y: Array, offered: Flags) -> Flags:
     # Rounding is no outlier: a fit without noise keeps all its rows.
     kept[offered] = np.abs(e) <= max(TRIM * s, 1e-9 * float(np.abs(target).max(initial=0.0)))
     return kept
+
+
+def rms(x: Array) -> float:
+    """Root mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(x**2))) if x.size else float("nan")
 
 
 def _spread(e: Array) -> float:

@@ -17,7 +17,6 @@ from codriver.signals.signal import Array
 from codriver.simulate.judge import at
 
 S = TypeVar("S", bound=np.generic)
-GRAVITY = 9.81
 GREEN, BLUE, RED, TURQUOISE, PURPLE = "#007A5A", "#0072B2", "#C84C00", "#2AA9B8", "#8E2F86"
 # The paper's colours of the knob: figure 4 draws 3, 2, 1 in green, blue and red.
 ELL_COLORS = {3.0: GREEN, 2.0: BLUE, 1.0: RED}
@@ -62,11 +61,6 @@ def true_curve(name: str, estimate: Estimate, truth: Log, signal: str, part: Win
     """A signal of the truth on the estimate's ticks, dotted."""
     time = part(estimate.time)
     return Curve(name, time, shown(signal, at(truth, signal, time)), BLACK, dash="dot", width=1.2)
-
-
-def slope_percent(offset: Array) -> Array:
-    """The accelerometer's offset as a slope: 100 tan(o_a / g) as the 2017 paper writes it."""
-    return np.asarray(100.0 * np.tan(np.clip(offset / GRAVITY, -1.2, 1.2)))
 
 
 def stretches(mask: Flags, x: Array, kind: str) -> list[Span]:

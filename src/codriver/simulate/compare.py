@@ -29,7 +29,7 @@ from codriver.program import compile
 from codriver.signals import Log
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
-from codriver.simulate.judge import at, delay_matched
+from codriver.simulate.judge import at, delay_matched, rms
 from codriver.vehicles import Vehicle
 
 Truth = Literal["model", "plan"]
@@ -109,13 +109,15 @@ def compare(estimates: Mapping[tuple[str, float | None], Estimate], truth: Log) 
     scores = []
     for of, (acceleration, jerk) in TRUTHS.items():
         moment = at(truth, jerk, first.time)
-        matched: dict[tuple[float | None, bool], Array] = {}  # observers of one ell that miss their inputs alike share it
+        matched: dict[
+            tuple[float | None, bytes], Array
+        ] = {}  # observers of one ell that miss their inputs alike share it
         for (name, ell), estimate in estimates.items():
             ours = jerk_of(estimate)
             correlation, lag = best_lag(ours, moment, use, first.grid.dt)
             score = Score(name, ell, of, rms((ours - moment)[use]), rms(moment[use]), correlation, lag)
             if name not in UNMATCHED:
-                key = ell, name == "kinematic"  # which has no inputs to miss
+                key = ell, estimate.columns.get("inputs_known", np.ones(0)).tobytes()
                 if key not in matched:
                     matched[key] = delay_matched(estimate, truth, acceleration).columns["intentional_jerk"]
                 wanted = matched[key]
@@ -153,8 +155,3 @@ def best_lag(estimate: Array, truth: Array, use: Flags, dt: float) -> tuple[floa
         if x.size > 2 and x.std() > 0 and y.std() > 0:
             best = max(best, (float(np.corrcoef(x, y)[0, 1]), lag * dt))
     return best
-
-
-def rms(x: Array) -> float:
-    """Root mean square; NaN of nothing."""
-    return float(np.sqrt(np.mean(x**2))) if x.size else float("nan")

@@ -134,9 +134,10 @@ def _row(
     sd = estimate.sd(name) if banded else None
     inside = float(np.mean(np.abs(error[valid]) <= 1.96 * sd[valid])) if sd is not None and valid.any() else None
     n = min(len(truth), len(other.grid)) if other is not None else 0
-    against = _rms((other.columns[rival][:n] - truth[:n])[valid[:n]]) if other is not None else None
-    return Judgement(label, unit, _rms(error[valid]), _rms(truth[valid]), against, inside)
+    against = rms((other.columns[rival][:n] - truth[:n])[valid[:n]]) if other is not None else None
+    return Judgement(label, unit, rms(error[valid]), rms(truth[valid]), against, inside)
 
 
-def _rms(x: Array) -> float:
+def rms(x: Array) -> float:
+    """Root mean square; NaN of nothing."""
     return float(np.sqrt(np.mean(x**2))) if x.size else float("nan")

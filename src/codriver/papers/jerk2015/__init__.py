@@ -82,8 +82,9 @@ def _parameters(driven: Driven) -> Chapter:
         Item("remark 2: only tau and M need to be known", "tau, M", ", ".join(needs), "", needs == ("mass", "transmission"),
              "the parameters that intent-torque asks of a vehicle"),
         Item("V: tau = 13, 6.9, 4.3, 3.1, 2.5 are 1/r_r times efficiencies and ratios (eq. 2)", "as printed",
-             f"{min(radii):.3f} to {max(radii):.3f} m", "", False,
-             "printed tau over those of the 2017 paper, gear by gear: a rolling radius each time, so 1/r_r is left out"),
+             f"{min(radii):.3f} to {max(radii):.3f} m", "", min(radii) > 0.5,
+             "printed tau over those of the 2017 paper, gear by gear: a rolling radius each time, so 1/r_r is left out. Quotients "
+             "near 1 would count"),
         Item("V: with the printed tau the gear shifts are rejected", "rejected", wrong, "1", wrong < 0.5,
              f"jerk error inside shifts, intention over kinematic, ell = {MIDDLE:g}; with tau / r_r it is {right:.3f}. Below a "
              "half counts"),

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from codriver.drivers.slopes import GRAVITY
 from codriver.estimate import Estimate
 from codriver.papers.drawing import (
     BLUE,
-    GRAVITY,
     GREEN,
     RED,
     curve,
@@ -25,8 +25,8 @@ from codriver.papers.item import Item
 from codriver.papers.reproduction import Chapter
 from codriver.report.document import BLACK, Chart, Curve, Plot
 from codriver.signals.signal import Array
-from codriver.simulate.compare import rms, shifting
-from codriver.simulate.judge import at
+from codriver.simulate.compare import shifting
+from codriver.simulate.judge import at, rms
 from codriver.simulate.track import LAP
 
 COLORS = {2.0: GREEN, 1.4: BLUE, 0.8: RED}

@@ -18,7 +18,7 @@ from codriver.papers.item import Item
 from codriver.papers.reproduction import Chapter
 from codriver.report.document import BLACK, Chart, Plot
 from codriver.signals import Log
-from codriver.simulate.compare import rms
+from codriver.simulate.judge import rms
 
 SCENE = "nuscenes-zoe-scene-0103"
 _TITLE = "A real recording beside it: regeneration in an electric car"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from codriver.drivers.slopes import slope_percent
 from codriver.estimate import Estimate
 from codriver.papers.drawing import (
     BLUE,
@@ -14,7 +15,6 @@ from codriver.papers.drawing import (
     curve,
     measured,
     shades,
-    slope_percent,
     window_in,
 )
 from codriver.papers.drives import Driven
@@ -24,8 +24,8 @@ from codriver.report.document import BLACK, Chart, Curve, Plot
 from codriver.report.shown import number
 from codriver.signals.signal import Array
 from codriver.simulate import ROAD_TEST_STRETCHES, Stretch
-from codriver.simulate.compare import rms, shifting
-from codriver.simulate.judge import at
+from codriver.simulate.compare import shifting
+from codriver.simulate.judge import at, rms
 
 COLUMNS = ("ramp_and_bend", "uphill", "straight")
 _TITLES = {
@@ -128,7 +128,6 @@ def _uphill(
     ours, by_pedals = part(intent.columns["intentional_jerk"]), part(pedals.columns["intentional_jerk"])
     meant = at(driven.truth, "intentional_jerk", time)
     shift = use & shifting(driven.truth, time)
-    note = "share of the time in which it grows steeper, shifts left out"
     return (
         Item("fig. 6, middle: the slope shows in the offset of both formulations", "well witnessed",
              f"{seen[0]:.2f} and {seen[1]:.2f}", "", min(seen) > 0.8,
@@ -140,7 +139,7 @@ def _uphill(
         Item("fig. 6, middle: our solution conforms better than the pedals", "better",
              f"{rms((ours - meant)[steeper]):.2f} against {rms((by_pedals - meant)[steeper]):.2f} m/s³", "",
              rms((ours - meant)[steeper]) < rms((by_pedals - meant)[steeper]),
-             f"rms error against the model's intention; {note.split(',')[1].strip()}. Ours lags, the pedals do not"),
+             "rms error against the model's intention; shifts left out. Ours lags, the pedals do not"),
         _kinematic_in_shifts("fig. 6, middle: the kinematic model suffers from the gear shift", intent, kinematic, part, shift),
     )  # fmt: skip
 

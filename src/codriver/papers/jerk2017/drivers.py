@@ -7,8 +7,9 @@ from itertools import combinations
 
 import numpy as np
 
+from codriver.drivers.slopes import slope_percent
 from codriver.estimate import Estimate
-from codriver.papers.drawing import slope_percent, window_in
+from codriver.papers.drawing import window_in
 from codriver.papers.drives import Driven
 from codriver.papers.item import Item
 from codriver.papers.jerk2017.performance import BOXES, bursts, in_order
@@ -17,8 +18,7 @@ from codriver.report.document import BLACK, COLORS, Chart, Curve, Plot, Table
 from codriver.report.shown import shown
 from codriver.signals.signal import Array
 from codriver.simulate import ROAD_TEST_STRETCHES
-from codriver.simulate.compare import rms
-from codriver.simulate.judge import at
+from codriver.simulate.judge import at, rms
 
 STEP = 1.0  # m along the road
 # Where slowing down for a line is looked for: line and metres before it, and the number of the box. The share of it done

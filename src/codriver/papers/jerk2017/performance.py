@@ -24,8 +24,7 @@ from codriver.papers.item import Item
 from codriver.papers.reproduction import Chapter
 from codriver.report.document import Chart, Curve, Plot, Table
 from codriver.simulate import ROAD_TEST_STRETCHES
-from codriver.simulate.compare import rms
-from codriver.simulate.judge import at
+from codriver.simulate.judge import at, rms
 
 BOXES = ("ramp", "bend", "other_car", "roundabout")
 _BURST = 0.5  # m/s^3: a jerk beyond this counts as a burst; large ones of an ordinary driver reach 1 to 2
