@@ -114,7 +114,7 @@ class TestHelp:
         for command in (
             (), ("demo",), ("info",), ("estimate",), ("check",), ("check", "vehicle"), ("check", "names"), ("export",),
             ("export", "c"), ("identify",), ("identify", "brake"), ("identify", "pedal"), ("identify", "ratio"), ("reproduce",),
-            ("simulate",), ("simulate", "road-test"), ("simulate", "track"), ("smooth",), ("tune",),
+            ("simulate",), ("simulate", "road-test"), ("simulate", "track"), ("smooth",), ("tune",), ("style",),
         ):  # fmt: skip
             ran = run(*command, "--help")
             assert ran.code == 0

@@ -29,14 +29,14 @@ app = typer.Typer(
 app.command("demo")(demo.demo)
 app.command("info")(info.info)
 app.command("estimate")(estimate.estimate)
-app.command("reproduce")(reproduce.reproduce)
 app.command("smooth")(smooth.smooth)
-app.command("style")(style.style)
-app.command("tune")(tune.tune)
-app.add_typer(check.app, name="check")
 app.add_typer(identify.app, name="identify")
-app.add_typer(export.app, name="export")
+app.command("tune")(tune.tune)
+app.command("style")(style.style)
+app.add_typer(check.app, name="check")
 app.add_typer(simulate.app, name="simulate")
+app.command("reproduce")(reproduce.reproduce)
+app.add_typer(export.app, name="export")
 
 
 def _version(wanted: bool) -> None:

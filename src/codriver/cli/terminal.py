@@ -57,7 +57,9 @@ def say(summary: dict[str, Any]) -> None:
 
     out = console()
     settings = summary["settings"]
-    parts = [f"{key} {settings[key]}" for key in ("vehicle", "ell", "preset", "form", "smoother") if key in settings]
+    parts = [
+        f"{key} {_short(settings[key])}" for key in ("vehicle", "ell", "preset", "form", "smoother") if key in settings
+    ]
     out.print(
         f"[bold]{summary['estimator']}[/] on {escape(summary['log'])}" + (f": {', '.join(parts)}" if parts else "")
     )
@@ -81,3 +83,12 @@ def say(summary: dict[str, Any]) -> None:
     out.print(
         f"\nwrote {escape(summary['result'])}" + (f" and {escape(summary['report'])}" if summary["report"] else "")
     )
+
+
+def _short(text: str) -> str:
+    """A setting as one reads it: a number with no more than four digits."""
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    return text if len(text) <= 5 else f"{number:.4g}"

@@ -77,7 +77,7 @@ ROAD_TEST_STRETCHES: dict[str, Stretch] = {
     "ramp": Stretch(26_800, 27_140, "exit ramp, give way, strong acceleration onto a main road (box 1)"),
     "bend": Stretch(27_140, 27_400, "sharp bend of the main road (box 2)"),
     "other_car": Stretch(27_500, 27_800, "another car seems to come out, then does not: brake, accelerate (box 3)"),
-    "roundabout": Stretch(28_700, 29_000, "give way at a roundabout, through it and out (box 4)"),
+    "roundabout": Stretch(28_560, 29_000, "give way at a roundabout, through it and out (box 4)"),
     "uphill": Stretch(11_950, 12_400, "short uphill segment, 8 %, on which the gearbox shifts down (figure 6, middle)"),
     "straight": Stretch(31_560, 31_990, "slightly inclined straight, 1.5 %, sped up on from a stop (figure 6, right)"),
     "motorway": Stretch(33_500, 47_000, "motorway"),
