@@ -18,9 +18,10 @@ from codriver.papers.judged import judged_chapter, means, shift_ratio
 from codriver.papers.registry import PAPERS
 from codriver.papers.reproduction import Chapter, Reproduction, Tell
 from codriver.report.document import Table
+from codriver.simulate import nominal_2015
 from codriver.simulate.car_parameters import PRINTED_2015, ROLLING_RADIUS_2015
 from codriver.simulate.compare import compare, run_estimators
-from codriver.vehicles import Vehicle, load_vehicle
+from codriver.vehicles import load_vehicle
 
 VEHICLE = PRESET = "bisoffi2015"
 ELLS = (0.8, 1.4, 2.0)
@@ -30,22 +31,14 @@ PLACES = Places("eq. (11)", "remark 4", "eq. (18)", "eq. (19)", "diag(1, ell)")
 JOBS = (Job("ordinary", 1), Job("brisk", 2), Job("aggressive", 3))
 
 
-def car() -> Vehicle:
-    """The paper's vehicle, its printed tau divided by the rolling radius that they leave out."""
-    return load_vehicle(VEHICLE).with_parameter(
-        "transmission",
-        tuple(tau / ROLLING_RADIUS_2015 for tau in PRINTED_2015),
-        source="printed tau over r_r = 0.313 m",
-    )
-
-
 def reproduce(tell: Tell, quick: bool, recordings: Path | None) -> Reproduction:
     """The paper, made again; see `codriver.papers.reproduce`."""
-    order = Order("track", car(), PRESET, ELLS, ESTIMATORS)
+    car = nominal_2015()
+    order = Order("track", car, PRESET, ELLS, ESTIMATORS)
     driven = drives(JOBS[:1] if quick else JOBS, order, tell)
     first = driven[0]
     tell("estimating")
-    own = run_estimators(first.log, car(), ESTIMATORS, ELLS, preset=PRESET)
+    own = run_estimators(first.log, car, ESTIMATORS, ELLS, preset=PRESET)
     intent = {ell: own["intent-torque", ell] for ell in ELLS}
     kinematic = {ell: own["kinematic", ell] for ell in ELLS}
     tell("judging")
@@ -53,7 +46,7 @@ def reproduce(tell: Tell, quick: bool, recordings: Path | None) -> Reproduction:
         design_chapter(PRESET, ELLS, PLACES),
         _parameters(first),
         states_chapter(first, intent, kinematic[MIDDLE]),
-        shifts_chapter(first, intent[MIDDLE], kinematic[MIDDLE], car()),
+        shifts_chapter(first, intent[MIDDLE], kinematic[MIDDLE], car),
         judged_chapter(driven, ELLS, "intent-torque", limits=False),
         zoe_chapter(recordings),
     )
@@ -91,7 +84,7 @@ def _parameters(driven: Driven) -> Chapter:
     )  # fmt: skip
     words = (
         f"The car simulated here has the printed tau divided by r_r = {ROLLING_RADIUS_2015:g} m, so that it drives like a car; the "
-        "estimator is given the same unless said otherwise.",
+        "estimator is given the same, rounded to 0.1 1/m, unless said otherwise.",
     )
     rows = tuple((str(gear), p, t, r) for gear, (p, t, r) in enumerate(zip(PRINTED_2015, later, radii, strict=True), 1))
     return Chapter(
