@@ -158,6 +158,7 @@ def _check(
     Raises:
         UsageError: an input is missing, or an output cannot be written or would replace an input.
     """
+    from codriver.cli.estimate import check_report
     from codriver.cli.options import check_inputs
     from codriver.drivers.alignment import HOWS
     from codriver.drivers.scale_file import check_scale_name
@@ -172,10 +173,7 @@ def _check(
         check_styles_name(out)
     if write_reference is not None:
         check_scale_name(write_reference)
-    if report is not None and report.suffix.lower() not in (".html", ".htm"):
-        raise UsageError(f"--report {report}", "a name ending in .html", "rename it")
-    if report is not None and not report.parent.is_dir():
-        raise UsageError(f"--report {report}: the folder does not exist", "an existing folder", "create it first")
+    check_report(report)
     inputs = [path for path in (*logs, dbc, names, reference) if path is not None]
     for output in (out, report):
         if output is not None and output.exists() and any(output.samefile(p) for p in inputs if p.exists()):
