@@ -10,7 +10,7 @@ from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
-from drives import table
+from drives import rms, table
 
 import codriver as cd
 from codriver.simulate import (
@@ -31,11 +31,6 @@ from codriver.simulate.road_test import decoded
 from codriver.simulate.sensors import Instruments
 
 LINE = 26_992.0  # where the ramp's low speed begins, m
-
-
-def rms(x: np.ndarray) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(x**2)))
 
 
 def drivers() -> None:
