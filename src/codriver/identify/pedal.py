@@ -62,6 +62,7 @@ class PedalFit:
         rmse, rmse_old, rmse_constant: of the validation half, N m; with the old c_r (None without one), and of its mean.
         minutes_fit, minutes_validation: used time of the halves.
         share: of all ticks left out, by reason; `used_share` of those that were not, `trimmed` as outliers of the rest.
+        block: s, length of a block of the bootstrap; `blocks` how many.
         pedal, request: filtered, all ticks.
         fitted, validated: ticks of the halves.
         sources: of the logs.

@@ -109,9 +109,8 @@ def compare(estimates: Mapping[tuple[str, float | None], Estimate], truth: Log) 
     scores = []
     for of, (acceleration, jerk) in TRUTHS.items():
         moment = at(truth, jerk, first.time)
-        matched: dict[
-            tuple[float | None, bytes], Array
-        ] = {}  # observers of one ell that miss their inputs alike share it
+        # Observers of one ell that miss their inputs on the same ticks have the same reference.
+        matched: dict[tuple[float | None, bytes], Array] = {}
         for (name, ell), estimate in estimates.items():
             ours = jerk_of(estimate)
             correlation, lag = best_lag(ours, moment, use, first.grid.dt)

@@ -110,11 +110,10 @@ def _calm_parts(run: Estimate) -> list[slice]:
         return []
     dt, n = run.grid.dt, len(run.grid)
     grid = run.log.sample(names, dt, start=float(run.time[0]), stop=float(run.time[-1]))
-    moved = np.zeros(n, bool)
     window, lead = round(WINDOW / dt), round(LEAD / dt)
     held = {name: np.where(grid.held[name], grid.values[name], np.nan)[:n] for name in names}
     parts, k = [], lead
-    moved |= run.flag("gear_shift") | ~run.valid
+    moved = run.flag("gear_shift") | ~run.valid
     while k + window <= n:
         part = slice(k - lead, k + window)
         if not moved[part].any() and all(_still(values, part) for values in held.values()):
