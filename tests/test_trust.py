@@ -203,6 +203,34 @@ def test_units_betray_themselves():
     assert "g read as m/s^2" in found(check, "bad")
 
 
+@pytest.mark.parametrize(
+    ("name", "factor", "said"),
+    [
+        ("accelerator_pedal", 0.01, "accelerator pedal goes with what the car does, yet is never above 0.0098 of 1"),
+        ("brake_pressure", 1e-5, "brake pressure goes with what the car does, yet is never above 0.00022 bar"),
+        ("brake_pressure", 1e-2, "never above 0.22 bar"),
+    ],
+)
+def test_pedals_in_too_small_a_unit(demo, car, name, factor, said):
+    """Such a pedal adds nothing, so innovations and known input show nothing."""
+    s = demo.measured[name]
+    log = demo.measured.with_signals(cd.Signal(name, s.time, factor * s.values, s.unit))
+    assert said in found(cd.compile(cd.build("intent-pedals", car)).run(log).check(), "bad")
+    assert said in found(cd.compile(cd.build("pedals-only", car)).run(log).check(), "bad")
+    assert "what the car does" not in found(kinematic(log).check(), "bad")  # which does not use it
+
+
+def test_pedals_that_rest_are_no_wrong_unit(demo, car):
+    """Cruise control and coasting: sensors that show their noise alone."""
+    rng = np.random.default_rng(0)
+    log = demo.measured
+    for name, noise in (("accelerator_pedal", 0.004), ("brake_pressure", 5e3)):
+        s = log[name]
+        log = log.with_signals(cd.Signal(name, s.time, noise * rng.standard_normal(s.time.size), s.unit))
+    check = cd.compile(cd.build("intent-pedals", car)).run(log).check()
+    assert "what the car does" not in found(check, "bad")
+
+
 def test_stuck_speed():
     log, _ = motion_log(120)
     v = log["longitudinal_speed"]

@@ -1,11 +1,20 @@
-"""Whether the accelerometer and the change of speed go together: what betrays a wrong sign, unit, axis or a stuck sensor."""
+"""Whether the signals of a drive go together: what betrays a wrong sign, unit, axis or a stuck sensor.
+
+* The accelerometer follows the change of speed.
+* A pedal that goes with what the car does, yet never moves as far as a foot moves it, has a unit that is too small: a share
+  taken for per cent, bar taken for Pa. Such a pedal adds nothing to an estimate, so its innovations do not show it. A pedal
+  that rests (cruise control, no braking) goes with nothing.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Collection
 
 import numpy as np
 
 from codriver.finding import Finding
 from codriver.signals import Log
+from codriver.signals.signal import Array
 
 # Ratios of (change of speed) / accelerometer that betray a unit, and what is then likely wrong.
 _SLOPES = (
@@ -16,6 +25,8 @@ _SLOPES = (
 )  # fmt: skip
 LEAST_STEPS = 20  # of 1 s
 LEAST_CHANGE = 0.1  # m/s in 1 s, standard deviation
+LEAST_PEDAL, LEAST_PRESSURE = 0.02, 0.3e5  # 1, Pa; below these no foot is at work
+GOES_WITH = 0.5  # correlation; 0.8 for the accelerator and 0.9 for the brake in the drives we have
 STILL = 0.15  # of the accelerometer's variation: a speed that changes less does not follow it
 
 
@@ -61,3 +72,42 @@ def sensors_agree(log: Log) -> list[Finding]:
         severity = "bad" if likely or not 0.4 < slope < 2.5 else "warn"
         return [Finding(severity, f"{said} where 1 is right{hint}; check the units of both, and the tyre radius")]
     return [Finding("ok", f"{said} (1 and 1 are right)")]
+
+
+def pedals_move(log: Log, used: Collection[str]) -> list[Finding]:
+    """Look for a pedal or a pressure that follows the car and stays far below what a foot does.
+
+    Args:
+        log: accelerator pedal with engine torque or accelerometer; brake pressure with accelerometer.
+        used: names of the signals that an estimate used.
+    """
+    names = ("accelerator_pedal", "brake_pressure", "engine_torque", "longitudinal_acceleration")
+    columns = log.sample([name for name in names if name in log], 0.05).values
+    a = columns.get("longitudinal_acceleration")
+    findings = []
+    pedal, torque = columns.get("accelerator_pedal"), columns.get("engine_torque")
+    if pedal is not None and "accelerator_pedal" in used:
+        follows = torque if torque is not None else None if a is None else np.where(a > 0, a, np.nan)
+        if follows is not None and _small(pedal, LEAST_PEDAL, follows):
+            findings.append(Finding(
+                "bad", f"the accelerator pedal goes with what the car does, yet is never above {np.nanmax(pedal):.2g} of 1: a "
+                'share taken for per cent? Then unit = "1" in the names file',
+            ))  # fmt: skip
+    pressure = columns.get("brake_pressure")
+    if pressure is None or a is None or "brake_pressure" not in used:
+        return findings
+    if _small(pressure, LEAST_PRESSURE, np.where(a < 0, -a, np.nan)):
+        findings.append(Finding(
+            "bad", f"the brake pressure goes with what the car does, yet is never above {np.nanmax(pressure) / 1e5:.2g} bar: "
+            'is its unit right in the names file ("bar", "kPa", "Pa")?',
+        ))  # fmt: skip
+    return findings
+
+
+def _small(values: Array, least: float, follows: Array) -> bool:
+    """Whether values stay below `least` and go with others all the same."""
+    there = np.isfinite(values) & np.isfinite(follows)
+    x, y = values[there], follows[there]
+    if x.size < 20 * LEAST_STEPS or not 0 < x.max() < least or x.std() == 0 or y.std() == 0:
+        return False
+    return bool(np.corrcoef(x, y)[0, 1] > GOES_WITH)

@@ -11,6 +11,7 @@ looked at, where the estimate is valid:
 * stretches where one of the two is above 16 for at least 1 s: wheel slip, a wrong ratio, a sensor fault;
 * the sensors against each other: accelerometer and change of speed must go together, else a sign or a unit is wrong;
 * the accelerometer offset: more than 3 m/s^2 is no road;
+* pedals that go with the car and stay far below what a foot does: a unit that is too small;
 * brake and known input: a brake that is always pressed, a powertrain that adds more than the vehicle shows;
 * used signals most of whose samples no vehicle can show: a unit or a scale is wrong.
 
@@ -29,7 +30,7 @@ import numpy.typing as npt
 from codriver.finding import Finding
 from codriver.innovations import Innovations, blocks, innovation_rows, row_name
 from codriver.observers.observer import Output
-from codriver.sensors_agree import sensors_agree
+from codriver.sensors_agree import pedals_move, sensors_agree
 from codriver.signals import Grid, Log
 from codriver.signals.signal import Array
 
@@ -117,7 +118,7 @@ def check_estimate(
                 "time, more than any road: "
                 + ("is its axis, unit or sign right?" if always else "a slide, a crash, a bad sensor?"), _spans(steep, grid),
             ))  # fmt: skip
-    findings += _driver(values, valid, grid)
+    findings += [*_driver(values, valid, grid), *pedals_move(log, grid.values)]
     absurd = Log({name: log[name] for name in grid.values if name in log}).implausible()
     findings += [Finding("bad" if fault in absurd else "warn", fault) for fault in log.faults]
     order = {"bad": 0, "warn": 1, "ok": 2}
