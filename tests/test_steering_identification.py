@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +10,14 @@ import pytest
 
 import codriver as cd
 from codriver.identify.steering_ekf import joint_ekf
+from codriver.identify.steering_fit import fit_wheel
 from codriver.identify.steering_joint import JointSettings, joint_functions
+from codriver.identify.steering_likelihood import Rows, run_wheel, simulate
+from codriver.identify.steering_passes import algorithm_1
+from codriver.identify.steering_record import mend_angle
 from codriver.identify.steering_ukf import Weights, joint_ukf, ukf_weights
+from codriver.identify.steering_wheel import identify_steering_wheel
+from codriver.identify.torque_scale import identify_torque_scale
 from codriver.models.steering import soften, steering_model, tick_of
 from codriver.observers.observer import Observer
 from codriver.simulate.steering import (
@@ -342,3 +349,342 @@ class TestJointFilters:
             new, outputs = interpret(recorded, carry, {**row, **{flag.name: 1.0 for flag in observer.flags}})
             carry = {**carry, **dict(zip(recorded.carry, new, strict=True))}
             assert outputs == [out[name][k] for name in recorded.outputs]
+
+
+def rows_of(runs: WheelRuns, run: int = 0, form: str = "exact") -> Rows:
+    n = runs.time.size
+    return Rows(0.01, runs.time, runs.torque, runs.measured[run], np.ones(n, bool), np.zeros(n, bool), form)
+
+
+TIME = np.arange(3001) * 0.01
+CHIRP = chirp(TIME, low=0.3, high=4.0)
+REAL = WheelSetting(
+    Wheel(friction=0.5), WheelNoise(resolution=0.1 * DEGREE), "exact", (0.0, 0.0)
+)  # a wheel with friction and an encoder of 0.1 degree
+
+
+@pytest.fixture(scope="module")
+def real() -> cd.Log:
+    return simulate_wheel(CHIRP, REAL).log()
+
+
+def with_angle(log: cd.Log, values: np.ndarray) -> cd.Log:
+    return log.with_signals(cd.Signal("steering_wheel_angle", log["steering_wheel_angle"].time, values, "rad"))
+
+
+def with_torque(log: cd.Log, values: np.ndarray, late: float = 0.0) -> cd.Log:
+    return log.with_signals(cd.Signal("steering_motor_torque", log["steering_motor_torque"].time - late, values, "N*m"))
+
+
+def is_right(fit, J_share: float = 0.02, b_share: float = 0.02) -> bool:
+    found = fit.coefficients
+    return bool(abs(found["J_s"].value / J - 1) < J_share and abs(found["b_s"].value / B - 1) < b_share)
+
+
+class TestLikelihood:
+    def test_against_statsmodels(self, paper):
+        """Without friction the filter is a Kalman filter: statsmodels agrees on innovations and likelihood."""
+        from statsmodels.tsa.statespace.kalman_filter import KalmanFilter
+
+        rows = rows_of(paper)
+        theta = np.array([np.log(J), np.log(B), 0.0, 0.3, np.log(1e-6), np.log(1e-4), np.log(3e-6)])
+        run = run_wheel(rows, theta)
+        tick = tick_of(J, B, 0.01)
+        other = KalmanFilter(1, 2, initialization="known", initial_state=[rows.angle[0], 0.0],
+                             initial_state_cov=np.diag([3e-6, 25.0]), loglikelihood_burn=1)  # fmt: skip
+        F = np.array([[1, tick.reach], [0, tick.keep]])
+        # It starts from the prediction of the second tick.
+        u = np.outer([tick.lift, tick.push], rows.torque + 0.3)
+        other.bind(np.ascontiguousarray(rows.angle[1:, None]))
+        other["design"], other["transition"], other["selection"] = np.array([[1.0, 0]]), F, np.eye(2)
+        other["state_cov"], other["obs_cov"] = np.diag([1e-6, 1e-4]), np.array([[3e-6]])
+        other["state_intercept"] = u[:, 1:]
+        Q = np.diag([1e-6, 1e-4])
+        other.initialize_known(F @ [rows.angle[0], 0.0] + u[:, 0], F @ np.diag([3e-6, 25.0]) @ F.T + Q)
+        other.loglikelihood_burn = 0
+        found = other.filter()
+        assert run.e[1:] == pytest.approx(found.forecasts_error[0], rel=1e-7, abs=1e-12)
+        assert run.s[1:] == pytest.approx(found.forecasts_error_cov[0, 0], rel=1e-7)
+        assert run.log_likelihood == pytest.approx(found.llf_obs.sum(), rel=1e-9)
+
+    def test_information_against_the_curvature(self, real):
+        """The covariance of the search is the inverse of log L's second derivatives, about."""
+        rows = rows_of(simulate_wheel(CHIRP, replace(REAL, wheel=Wheel())))
+        best = fit_wheel(rows)
+        steps = [1e-3, 1e-3]
+        curvature = np.empty((2, 2))
+        for i, k in itertools.product(range(2), repeat=2):
+            at = []
+            for a, b in itertools.product((1, -1), repeat=2):
+                theta = best.theta.copy()
+                theta[i] += a * steps[i]
+                theta[k] += b * steps[k]
+                at.append(a * b * run_wheel(rows, theta).log_likelihood)
+            curvature[i, k] = sum(at) / (4 * steps[i] * steps[k])
+        size = np.sqrt(np.diag(best.covariance)[:2])
+        assert best.covariance[:2, :2] / np.outer(size, size) == pytest.approx(
+            np.linalg.inv(-curvature) / np.outer(size, size), abs=0.1
+        )
+
+    def test_simulation_is_the_filter_without_measurements(self, real):
+        rows = rows_of(simulate_wheel(CHIRP, replace(REAL, noise=WheelNoise(process=0.0, angle=0.0))))
+        theta = np.array([np.log(J), np.log(B), 0.5, 0.0, -20.0, -20.0, -20.0])
+        assert simulate(rows, theta, 0, (0.0, 0.0)) == pytest.approx(rows.angle, abs=1e-9)
+
+
+class TestFit:
+    @pytest.mark.parametrize("guess", [HALF, (3 * J, 0.3 * B), None])
+    def test_any_start_leads_to_the_same(self, continuous, guess):
+        best = fit_wheel(rows_of(continuous, 3, "euler"), guess)
+        assert best.converged
+        reference = fit_wheel(rows_of(continuous, 3, "euler"), (J, B))
+        assert best.theta[:2] == pytest.approx(reference.theta[:2], abs=2e-4)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize(("reading", "plant", "most"), [
+        ("derivative", "euler", (0.002, 0.002)), ("continuous", "euler", (0.018, 0.013)),
+        ("derivative", "exact", (0.002, 0.002)), ("continuous", "exact", (0.018, 0.013)),
+    ])  # fmt: skip
+    def test_many_seeds(self, reading, plant, most):
+        """None is lost from half of the truth; errors, their standard errors, and innovations of records not fitted on."""
+        count = 200 if plant == "euler" else 50
+        runs = simulate_wheel(setting=WheelSetting(noise=WheelNoise(reading), plant=plant), runs=count)
+        fits = [fit_wheel(rows_of(runs, run, plant), HALF) for run in range(count)]
+        found = np.exp([fit.theta[:2] for fit in fits])
+        error = found / [J, B] - 1
+        assert lost(found).sum() == 0
+        assert np.all(np.sqrt(np.mean(error**2, axis=0)) < most)
+        z = np.array(
+            [[error[k, i] / fit.sd(name) for i, name in enumerate(("ln_J", "ln_b"))] for k, fit in enumerate(fits)]
+        )
+        assert np.all((z.std(axis=0) > 0.75) & (z.std(axis=0) < 1.15))
+        nis = [run_wheel(rows_of(runs, (run + 1) % count, plant), fit.theta).nis for run, fit in enumerate(fits)]
+        assert 0.9 < np.mean(nis) < 1.1
+        assert np.mean([0.9 < fit.run.nis < 1.1 for fit in fits]) == 1
+
+    def test_friction(self):
+        """Left out it makes b_s 65 % too large; in the model all three are right, and their standard errors hold."""
+        runs = simulate_wheel(CHIRP, REAL, runs=8)
+        without = fit_wheel(rows_of(runs))
+        assert np.exp(without.theta[1]) > 1.4 * B
+        z = []
+        for run in range(8):
+            best = fit_wheel(rows_of(runs, run), friction=True)
+            truth = np.array([np.log(J), np.log(B), 0.5])
+            z.append((best.theta[:3] - truth) / [best.sd(name) for name in ("ln_J", "ln_b", "T_c")])
+        assert np.sqrt(np.mean(np.square(z))) < 1.5
+        assert np.abs(z).max() < 4
+
+    def test_speed(self, paper):
+        """Cost counted: filter runs of one fit."""
+        from unittest.mock import patch
+
+        from codriver.identify import steering_fit, steering_likelihood
+
+        with patch.object(steering_likelihood, "_program", wraps=steering_likelihood._program) as ran:
+            steering_fit.fit_wheel(rows_of(paper, 0, "euler"), HALF)
+        assert ran.call_count < 2000
+
+
+class TestAlgorithm1:
+    def test_restarts(self, continuous):
+        """A filter that loses 36 of 200 runs finds the wheel by restarts; every pass says why it was not the last."""
+        settings = JointSettings(HALF, process=(1e-4, 1e-4, 5e-8, 5e-8))
+        first = lost(ends(joint_ekf(settings), continuous)[0])
+        assert first.sum() > 20
+        results = [algorithm_1(grid_of(continuous, run), settings) for run in np.flatnonzero(first)[:15]]
+        assert all(len(result.passes) > 1 for result in results)
+        assert all(p.why_not for result in results for p in result.passes[:-1])
+        found = np.array([result.values for result in results if result.converged])
+        assert len(found) == 15
+        assert not lost(found).any()
+
+    def test_negative_inertia_is_told(self, continuous):
+        settings = JointSettings(HALF, process=(1e-4, 1e-4, 5e-8, 5e-8))
+        bad = int(np.flatnonzero(lost(ends(joint_ekf(settings), continuous)[0]))[0])
+        told = algorithm_1(grid_of(continuous, bad), settings).passes[0]
+        assert told.lost
+        assert "not positive, or not finite, at" in told.why_not
+
+    def test_first_pass_is_the_filter(self, paper):
+        result = algorithm_1(grid_of(paper), JointSettings(HALF), joint_ukf)
+        assert result.converged
+        assert len(result.passes) == 1
+        few = replace(paper, measured=paper.measured[:1])
+        assert result.values == pytest.approx(ends(joint_ukf(JointSettings(HALF)), few)[0][0])
+
+    def test_gives_up(self):
+        """A wheel that does not turn: no pass converges, and it ends."""
+        time = np.arange(500) * 0.01
+        still = WheelRuns(time, np.zeros(500), np.zeros((1, 500)), np.zeros((1, 500)), np.zeros((1, 500)))
+        result = algorithm_1(grid_of(still), JointSettings(HALF))
+        assert not result.converged
+        assert result.passes[-1].why_not
+
+
+class TestRecording:
+    """`identify_steering_wheel` on recordings as they come: right, or told."""
+
+    def test_a_clean_one(self, real):
+        fit = identify_steering_wheel(real)
+        assert is_right(fit)
+        assert fit.coefficients["T_c"].value == pytest.approx(0.5, abs=0.02)
+        assert fit.refused == ()
+        assert {f.severity for f in fit.findings} == {"ok"}
+        assert [p.name for p in fit.filters] == ["joint-ekf", "joint-ukf"]
+        assert fit.r2 > 0.99
+
+    def test_preset(self, paper):
+        fit = identify_steering_wheel(paper.log(), preset="okamoto2019", guess=HALF)
+        assert is_right(fit, 0.005, 0.005)
+        assert "T_c" not in fit.coefficients
+        assert fit.filters[0].values == pytest.approx((0.0654, 0.3498), rel=0.05)
+
+    def test_degrees_on_the_wire(self, real, tmp_path):
+        """A CSV with degrees gives the same wheel."""
+        angle, torque = real["steering_wheel_angle"], real["steering_motor_torque"]
+        path = tmp_path / "wheel.csv"
+        rows = [
+            f"{t:.2f},{a / DEGREE:.1f},{u:.5f}" for t, a, u in zip(angle.time, angle.values, torque.values, strict=True)
+        ]
+        path.write_text("\n".join(["time [s],steering_wheel_angle [deg],steering_motor_torque [N*m]", *rows]) + "\n")
+        fit = identify_steering_wheel(cd.read(path), filters=False)
+        assert is_right(fit)
+
+    def test_encoder_jumps_and_spikes(self, real):
+        values = real["steering_wheel_angle"].values.copy()
+        values[1000:] += 0.3
+        values[2000:] -= 0.05
+        values[500] += 1.0
+        fit = identify_steering_wheel(with_angle(real, values), filters=False)
+        assert is_right(fit)
+        told = " ".join(f.text for f in fit.findings)
+        assert "1 single samples of the angle are spikes" in told
+        assert "2 moments fit no motion of the wheel" in told
+
+    def test_wrapped_angle(self, real):
+        whole = real["steering_wheel_angle"].values * 8
+        wrapped = (whole + np.pi) % (2 * np.pi) - np.pi
+        mended, jumps, findings = mend_angle(with_angle(real, wrapped)["steering_wheel_angle"])
+        turns = (mended.values - whole) / (2 * np.pi)
+        assert np.allclose(turns, turns[0])
+        assert jumps.size == 0
+        assert "wraps" in findings[0].text
+
+    def test_end_stops(self):
+        setting = replace(REAL, wheel=Wheel(friction=0.5, end_stop=1.0))
+        fit = identify_steering_wheel(simulate_wheel(3 * CHIRP, setting).log(), filters=False)
+        assert is_right(fit)
+        assert len(fit.end_stops) == 2
+        assert all(abs(abs(stop) - 1.0) < 0.25 for stop in fit.end_stops)
+        assert sum("stopped at" in f.text for f in fit.findings) == 2
+
+    def test_end_stop_by_hand(self):
+        setting = replace(REAL, wheel=Wheel(friction=0.5, end_stop=1.0))
+        fit = identify_steering_wheel(simulate_wheel(3 * CHIRP, setting).log(), end_stop=0.98, filters=False)
+        assert is_right(fit)
+        assert fit.left_out > 0.2
+
+    def test_saturated_angle(self, real):
+        values = np.clip(real["steering_wheel_angle"].values, -0.5, 2.0)
+        fit = identify_steering_wheel(with_angle(real, values), filters=False)
+        assert is_right(fit, 0.05, 0.05)
+        assert any("rests at its greatest" in f.text for f in fit.findings)
+        with pytest.raises(cd.CodriverError, match="usable"):
+            identify_steering_wheel(with_angle(real, np.clip(values, -0.2, 0.02)))
+
+    def test_late_torque(self, real):
+        fit = identify_steering_wheel(with_torque(real, real["steering_motor_torque"].values, 0.05), filters=False)
+        assert fit.delay == pytest.approx(0.05)
+        assert is_right(fit)
+        assert any("50 ms late" in f.text for f in fit.findings)
+
+    def test_constant_torque(self):
+        log = simulate_wheel(CHIRP + 0.2, REAL).log()
+        fit = identify_steering_wheel(with_torque(log, CHIRP), filters=False)
+        assert fit.coefficients["T_0"].value == pytest.approx(0.2, abs=0.01)
+        assert is_right(fit)
+
+    def test_wrong_sign_is_refused(self, real):
+        fit = identify_steering_wheel(with_torque(real, -CHIRP), filters=False)
+        assert not fit.coefficients
+        with pytest.raises(cd.CodriverError, match="something else turns the wheel"):
+            fit.vehicle()
+
+    def test_hands_on_the_wheel(self):
+        hands = np.convolve(np.random.default_rng(1).standard_normal(3001), np.ones(60) / 60, "same") * 8
+        log = simulate_wheel(CHIRP + hands, REAL).log()
+        fit = identify_steering_wheel(with_torque(log, CHIRP), filters=False)
+        assert not fit.coefficients
+        assert any("hands on the wheel" in f.text for f in fit.findings)
+
+    def test_slow_record_does_not_tell_the_inertia(self):
+        """0.1 N m at 0.1 rad/s: b_s is told, J_s is refused with its share of the torque."""
+        setting = replace(REAL, wheel=Wheel(), noise=WheelNoise())
+        fit = identify_steering_wheel(simulate_wheel(0.1 * np.sin(0.1 * TIME), setting).log(), filters=False)
+        assert [r.name for r in fit.refused] == ["J_s"]
+        assert "hardly accelerates" in fit.refused[0].reason
+        assert fit.coefficients["b_s"].value == pytest.approx(B, rel=0.05)
+        assert "steering_inertia" not in fit.vehicle()
+
+    def test_stuck_wheel_is_refused(self):
+        fit = identify_steering_wheel(simulate_wheel(0.4 * np.sin(0.3 * TIME), REAL).log(), filters=False)
+        assert not fit.coefficients
+
+    @pytest.mark.parametrize(("change", "said"), [
+        (lambda log: with_torque(log, 0 * CHIRP), "tells b_s / J_s alone"),
+        (lambda log: with_angle(log, 0 * TIME), "usable|turns by"),
+        (lambda log: log.between(0, 2), "at least 3 s"),
+        (lambda log: log.without("steering_motor_torque"), "lacks steering_motor_torque or steering_motor_command"),
+    ])  # fmt: skip
+    def test_records_that_say_nothing(self, real, change, said):
+        with pytest.raises(cd.CodriverError, match=said):
+            identify_steering_wheel(change(real))
+
+    def test_commands_need_a_scale(self, real):
+        command = cd.Signal("steering_motor_command", TIME, (CHIRP - 0.2197) / 1.8615, "1")
+        log = real.without("steering_motor_torque").with_signals(command)
+        with pytest.raises(cd.CodriverError, match="no torque_scale"):
+            identify_steering_wheel(log)
+        scaled = identify_torque_scale(
+            np.array([0.0, 1, 2, 3]), (1.8615 * np.arange(4) + 0.2197) / 9.81 / 0.14
+        ).vehicle()
+        fit = identify_steering_wheel(log, scaled, filters=False)
+        assert is_right(fit)
+        assert fit.vehicle(scaled).number("torque_scale") == pytest.approx(1.8615)
+
+    def test_options_that_cannot_be(self, real):
+        for options in ({"preset": "other"}, {"guess": (-1.0, 1.0)}, {"delay": -0.1}, {"end_stop": 0.0}):
+            with pytest.raises(cd.CodriverError):
+                identify_steering_wheel(real, **options)
+
+
+class TestTorqueScale:
+    def test_against_scipy(self):
+        from scipy.stats import linregress
+
+        rng = np.random.default_rng(3)
+        mass = np.array([-2.0, -1, -0.5, 0.5, 1, 1.5, 2, 2.5])
+        command = (mass * 9.81 * 0.14 - 0.2197) / 1.8615 + 0.02 * rng.standard_normal(8)
+        fit, other = identify_torque_scale(command, mass), linregress(command, mass * 9.81 * 0.14)
+        assert (fit.scale, fit.offset) == pytest.approx((other.slope, other.intercept), rel=1e-12)
+        assert (fit.sd_scale, fit.sd_offset) == pytest.approx((other.stderr, other.intercept_stderr), rel=1e-9)
+        assert fit.low < 1.8615 < fit.high
+
+    def test_interval_covers(self):
+        mass = np.linspace(-2, 2, 9)
+        inside = 0
+        for seed in range(400):
+            noise = 0.05 * np.random.default_rng(seed).standard_normal(9)
+            # Noise of the torque, so that least squares of torque on command has no bias.
+            fit = identify_torque_scale((mass * 9.81 * 0.14 - 0.2) / 1.86, mass + noise)
+            inside += fit.low < 1.86 < fit.high
+        assert 0.92 < inside / 400 < 0.98
+
+    @pytest.mark.parametrize(("command", "mass"), [
+        ([1.0, 2.0], [1.0, 2.0]), ([1.0, 1.0, 1.0], [1.0, 2.0, 3.0]), ([1.0, 2.0, 3.0], [1.0, 1.0, 1.0]),
+        ([1.0, 2.0, 3.0, 4.0], [1.0, -2.0, 3.0, -4.0]), ([1.0, 2.0, np.nan], [1.0, 2.0, 3.0]),
+    ])  # fmt: skip
+    def test_refusals(self, command, mass):
+        with pytest.raises(cd.CodriverError):
+            identify_torque_scale(np.array(command), np.array(mass))

@@ -6,6 +6,9 @@ from codriver.identify.check_log import check_vehicle_against_log
 from codriver.identify.learning import LearningPoint
 from codriver.identify.pedal import PedalFit, identify_pedal
 from codriver.identify.ratio import GearRatio, RatioFit, identify_ratio
+from codriver.identify.steering_result import SteeringFit
+from codriver.identify.steering_wheel import identify_steering_wheel
+from codriver.identify.torque_scale import TorqueScale, identify_torque_scale
 
 __all__ = [
     "BrakeFit",
@@ -15,8 +18,12 @@ __all__ = [
     "PedalFit",
     "RatioFit",
     "Refusal",
+    "SteeringFit",
+    "TorqueScale",
     "check_vehicle_against_log",
     "identify_brake",
     "identify_pedal",
     "identify_ratio",
+    "identify_steering_wheel",
+    "identify_torque_scale",
 ]
