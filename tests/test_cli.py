@@ -174,6 +174,36 @@ class TestInfo:
         ).summary
         assert [s["name"] for s in told["signals"]] == ["longitudinal_speed"]
 
+    @pytest.mark.parametrize(
+        ("gears", "reverse", "severity", "said"),
+        [
+            ((2, 3, 4, 5), 0, "", ""),
+            ((2, 3, 6, 5), 0, "warn", "gear 6, where transmission of the vehicle file has 5 gears: 25."),
+            ((2, 3, -1, 0), 0, "warn", "reverse, where the vehicle file has no transmission_reverse: 33."),
+            ((2, 3, -1, 0), 30, "", ""),
+            ((2, 7, -1, 8), 0, "bad", "gear 7, 8, where transmission of the vehicle file has 5 gears, and reverse"),
+        ],
+    )
+    def test_gears_that_the_vehicle_lacks(self, run, estimate, car, tmp_path, gears, reverse, severity, said):
+        columns = motion(40)
+        columns["gear"] = np.repeat(np.array(gears, float), 1000)
+        columns["engine_torque"] = columns["engine_torque_request"] = 50 + 0 * columns["time"]
+        log, vehicle = csv(tmp_path / "gears.csv", columns), tmp_path / "car.toml"
+        cd.save_vehicle(car.with_parameter("transmission_reverse", reverse) if reverse else car, vehicle)
+        ran = run("info", log, "--vehicle", vehicle, "--json")
+        told = ran.summary["findings"]
+        assert [f["severity"] for f in told] == [severity] * bool(severity)
+        assert all(said in f["text"] for f in told)
+        shown = run("info", log, "--vehicle", vehicle).out
+        assert (said in shown) if said else ("transmission" not in shown)
+        if severity == "warn":
+            assert f"{severity}: the log shows {said}" in estimate("intent-torque", log, "--vehicle", vehicle).findings
+
+    def test_a_car_of_one_gear_and_a_log_of_several(self, run, demo_files, can):
+        ran = run("info", demo_files.log, *can, "--vehicle", "renault-zoe", "--json")
+        assert "has one gear: " in ran.summary["findings"][0]["text"]
+        assert ran.summary["findings"][0]["severity"] == "bad"
+
     def test_a_vehicle_that_lacks_parameters(self, run, demo_files, can):
         ran = run("info", demo_files.log, *can, "--vehicle", "renault-zoe")
         assert "lacks vehicle parameters: pedal_coefficient, brake_coefficient" in ran.out

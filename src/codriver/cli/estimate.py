@@ -81,7 +81,7 @@ def estimate_file(
         run = work or estimate_log
         result = run(name, recorded, vehicle, ell=ell, rate=rate, preset=preset, form=form)
         _refuse_empty(result)
-        check = _with_vehicle(result.check(), recorded, vehicle)
+        check = _with_vehicle(result, recorded, vehicle)
         stage(f"writing {out.name}" + (f" and {report.name}" if report is not None else ""))
         _write(result, check, out, report, command_line(), truth)
     told = _told(result, check, out, report, why)
@@ -146,16 +146,23 @@ def _refuse_empty(result: Estimate) -> None:
     )
 
 
-def _with_vehicle(check: Check, log: Log, vehicle: Vehicle | None) -> Check:
+def _with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> Check:
     """The verdict with what the log itself says of the vehicle's parameters, which innovations do not show."""
+    check = result.check()
     if vehicle is None:
         return check
     from codriver.identify import check_vehicle_against_log
+    from codriver.observers.gears import unknown_gears
 
     found = [f for f in check_vehicle_against_log(log, vehicle) if f.severity != "ok"]
     order = {"bad": 0, "warn": 1, "ok": 2}
     findings = sorted(
-        [*(replace(f, text=f"vehicle file: {f.text}") for f in found), *check.findings], key=lambda f: order[f.severity]
+        [
+            *(replace(f, text=f"vehicle file: {f.text}") for f in found),
+            *(unknown_gears(log, vehicle) if "gear" in result.grid.values else []),
+            *check.findings,
+        ],
+        key=lambda f: order[f.severity],
     )
     return replace(check, findings=tuple(findings))
 

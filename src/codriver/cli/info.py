@@ -18,6 +18,7 @@ def info(
     from codriver.logs import open_recording
     from codriver.logs.read import own_names, read_recording
     from codriver.observers.feed import best, feeds, least_demanding
+    from codriver.observers.gears import unknown_gears
     from codriver.signals import Log
     from codriver.vehicles import load_vehicle
 
@@ -44,6 +45,7 @@ def info(
         "channels": [{"name": c.name, "unit": c.unit} for c in channels.values()],
         "unmapped": list(signals.unmapped),
         "faults": list(signals.faults),
+        "findings": [{"severity": f.severity, "text": f.text} for f in unknown_gears(signals, car)] if car else [],
         "estimators": [
             {
                 "name": f.estimator,
@@ -72,7 +74,7 @@ def _show(summary: dict[str, Any]) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from codriver.cli.terminal import console
+    from codriver.cli.terminal import console, say_findings
 
     out = console()
     span = ""
@@ -106,6 +108,9 @@ def _show(summary: dict[str, Any]) -> None:
         out.print(f"\nnot mapped ({len(summary['unmapped'])}): {escape(', '.join(summary['unmapped'][:most]))}{more}")
     for fault in summary["faults"]:
         out.print(f"[yellow]warn[/] {escape(fault)}")
+    if summary["findings"]:
+        out.print(f"\n[bold]vehicle {escape(summary['vehicle'])}[/]")
+        say_findings(out, summary["findings"])
     out.print("\n[bold]estimators[/]")
     for e in summary["estimators"]:
         if e["possible"]:
