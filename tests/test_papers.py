@@ -8,10 +8,12 @@ import pytest
 from codriver.errors import UsageError
 from codriver.papers import reproduce
 from codriver.papers.item import Item, near
+from codriver.papers.jerk2015.zoe import zoe_chapter
 from codriver.papers.jerk2017.performance import in_order
 from codriver.papers.jerk_design import Places, design_chapter
 from codriver.papers.judged import ERROR_LIMITS, SHIFT_LIMITS
 from codriver.papers.reproduction import Chapter, Reproduction
+from conftest import recording
 
 
 def test_near_judges_by_its_tolerance():
@@ -168,3 +170,31 @@ class TestJerk2015:
 
     def test_without_recordings_it_says_so(self, jerk2015):
         assert any("not there" in word for chapter in jerk2015.chapters for word in chapter.words)
+
+
+@pytest.mark.slow
+def test_the_command_writes_both_files(tmp_path, capsys):
+    from codriver.cli import main
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", ["codriver", "reproduce", "jerk2015", "--quick", "-o", str(tmp_path / "new")])
+        with pytest.raises(SystemExit) as done:
+            main()
+    assert done.value.code in (0, None)
+    assert sorted(p.name for p in (tmp_path / "new").iterdir()) == ["jerk2015.html", "jerk2015.json"]
+    said = capsys.readouterr().out
+    assert "jerk2015: " in said
+    assert "does not hold: V: with the printed tau" in said
+
+
+def test_the_recorded_zoe():
+    chapter = zoe_chapter(recording("nuscenes-zoe-scene-0103").parent)
+    assert [item.holds for item in chapter.items] == [True, True]
+    assert len(chapter.shown) == 1
+
+
+def test_a_folder_without_the_recording(tmp_path):
+    for folder in (None, tmp_path):
+        chapter = zoe_chapter(folder)
+        assert chapter.items == ()
+        assert "not there" in chapter.words[0]

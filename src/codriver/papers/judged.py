@@ -60,12 +60,18 @@ def judged_chapter(drives: Sequence[Driven], ells: tuple[float, ...], estimator:
 
 
 def means(scores: Iterable[Score]) -> Mean:
-    """Means over drives of each figure, by estimator, ell and truth; NaN where there is none."""
+    """Means over the drives that have a figure, by estimator, ell and truth; NaN where none has it."""
     gathered: dict[tuple[str, float | None, Truth], list[list[float]]] = {}
     for score in scores:
         row = [np.nan if (value := getattr(score, name)) is None else float(value) for name in _FIELDS]
         gathered.setdefault((score.estimator, score.ell, score.truth), []).append(row)
-    return {key: dict(zip(_FIELDS, np.mean(rows, axis=0).tolist(), strict=True)) for key, rows in gathered.items()}
+    return {key: dict(zip(_FIELDS, map(_mean, zip(*rows, strict=True)), strict=True)) for key, rows in gathered.items()}
+
+
+def _mean(values: Iterable[float]) -> float:
+    """The mean of the numbers among the values."""
+    there = [value for value in values if not np.isnan(value)]
+    return float(np.mean(there)) if there else float("nan")
 
 
 def shift_ratio(mean: Mean, ell: float, truth: Truth, estimator: str, where: str = "shifts") -> float:
@@ -78,6 +84,8 @@ def _items(mean: Mean, ells: tuple[float, ...], estimator: str, limits: bool) ->
     for ell in ells:
         for truth in TRUTHS:
             ratio, around = (shift_ratio(mean, ell, truth, estimator, where) for where in ("shifts", "around"))
+            if np.isnan(ratio):
+                continue  # no driver shifted
             bound = SHIFT_LIMITS[truth][ell] if limits else 1.0
             ours, other = mean[estimator, ell, truth], mean["kinematic", ell, truth]
             nearer = "" if ours["shifts"] < ours["shifts_zero"] else ", which is nearer here"

@@ -28,7 +28,7 @@ from codriver.summary import measured_on_ticks
 BLUE, ORANGE, GREEN, RED, BLACK, GREY = "#0072B2", "#E69F00", "#007A5A", "#C84C00", "#1a1a1a", "#757575"
 PURPLE = "#8E2F86"
 SIGMAS = 1.96  # half width of a 95% band in standard deviations
-GRAVITY = 9.81
+GRAVITY = 9.80665
 # Estimates that the panels below draw in a way of their own.
 SPECIAL = (
     "longitudinal_speed", "intentional_acceleration", "longitudinal_acceleration", "intentional_jerk",

@@ -18,7 +18,7 @@ from codriver.simulate.bus import BusParameters, Hole, transmit, write_trace
 from codriver.simulate.can_layout import dbc_text
 from codriver.simulate.car import GRAVITY
 from codriver.simulate.drive import Trace, drive
-from codriver.simulate.folder import refuse_foreign, write_whole
+from codriver.simulate.folder import refuse_foreign, write_folder
 from codriver.simulate.network import MESSAGES, names_text
 from codriver.simulate.road import demo_road
 from codriver.simulate.sensors import Instruments, SensorParameters, measured_log
@@ -85,7 +85,7 @@ def write_demo(folder: str | Path, seed: int = 1) -> DemoFiles:
     folder = Path(folder)
     refuse_foreign(folder, "demo")
     demo = demo_drive(seed)
-    write_whole(folder, lambda scratch: _write(demo, _files(scratch), seed), "demo")
+    write_folder(folder, lambda scratch: _write(demo, _files(scratch), seed), "demo")
     return _files(folder)
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from codriver.simulate.bus import write_trace
 from codriver.simulate.can_layout import dbc_text
 from codriver.simulate.car_parameters import PRINTED_2015, ROLLING_RADIUS_2015
-from codriver.simulate.folder import write_whole
+from codriver.simulate.folder import write_folder
 from codriver.simulate.network import MESSAGES, names_text
 from codriver.simulate.road_test import RoadTest
 from codriver.vehicles import Vehicle, load_vehicle, save_vehicle
@@ -58,7 +58,7 @@ def write_drive(folder: str | Path, test: RoadTest, *, vehicle: Vehicle | None =
         LogError: a file cannot be written.
     """
     folder = Path(folder)
-    write_whole(folder, lambda scratch: _write(_files(scratch, vehicle), test, vehicle), "simulated drive")
+    write_folder(folder, lambda scratch: _write(_files(scratch, vehicle), test, vehicle), "simulated drive")
     return _files(folder, vehicle)
 
 

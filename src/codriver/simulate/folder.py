@@ -35,7 +35,7 @@ def refuse_foreign(folder: Path, what: str) -> None:
         )
 
 
-def write_whole(folder: Path, write: Callable[[Path], None], what: str) -> None:
+def write_folder(folder: Path, write: Callable[[Path], None], what: str) -> None:
     """Let `write` fill a temporary folder, then move its files into `folder`, made if need be.
 
     Args:

@@ -16,6 +16,7 @@ from codriver.papers.jerk2017.alternatives import alternatives_chapter
 from codriver.papers.jerk2017.drivers import drivers_chapter
 from codriver.papers.jerk2017.identification import identification_chapter
 from codriver.papers.jerk2017.noise import noise_chapter
+from codriver.papers.jerk2017.parameters import parameters_chapter
 from codriver.papers.jerk2017.performance import performance_chapter
 from codriver.papers.jerk_design import Places, design_chapter
 from codriver.papers.judged import judged_chapter
@@ -74,6 +75,7 @@ def reproduction(driven: Sequence[Driven], noisy: Sequence[Driven], tell: Tell) 
         noise_chapter((sixth, *noisy)),
         drivers_chapter({drive.job.driver: drive for drive in driven}, each),
         judged_chapter(driven, ELLS, "intent-pedals", limits=True),
+        parameters_chapter(sixth, vehicle, PRESET),
     )
     return Reproduction(
         "jerk2017",
