@@ -10,7 +10,8 @@ import pytest
 import codriver as cd
 from codriver.errors import NamesError
 from codriver.live import BusDecoder
-from codriver.logs.mend import drop_codes, mend_clock
+from codriver.logs.clock import mend_clock
+from codriver.logs.mend import drop_codes
 from codriver.logs.names_file import parse_names
 from codriver.logs.wording import counted
 
@@ -253,6 +254,78 @@ class TestClock:
         mended, _, notes = mend_clock(time, time)
         assert mended.size == 99
         assert notes == [f"1 sample with a stamp far from its neighbours' left out ({stamp:g} s)"]
+
+
+class TestSharedClock:
+    """Two drives joined in one file: the first is driven at 10 m/s in gear 1, the second at 20 m/s in gear 2."""
+
+    DRIVES = ((60.0, 10.0, 1), (50.0, 20.0, 2))  # the first is kept
+    NAMES = '[longitudinal_speed]\nsource = "Left.Speed"\n[gear]\nsource = "Box.Gear"\n'
+
+    @pytest.mark.parametrize("late", [(2, 40), (None, 5), (50, None), (55, 2)])
+    def test_columns_of_a_table(self, tmp_path, late):
+        """The gear is told once or twice in each drive; alone it would keep the drive in which its stamps are further apart."""
+        lines = []
+        for (seconds, v, gear), first in zip(self.DRIVES, late, strict=True):
+            told = () if first is None else (10 * first, 450)
+            lines += [f"{k / 10:.1f},{v},{gear if k in told else ''}\n" for k in range(int(10 * seconds))]
+        (tmp_path / "d.csv").write_text("time [s],longitudinal_speed [m/s],gear\n" + "".join(lines))
+        log = cd.read(tmp_path / "d.csv")
+        assert log["longitudinal_speed"].time[-1] == 59.9
+        assert set(log["longitudinal_speed"].values) == {10.0}
+        if late[0] is None:
+            assert "gear" not in log
+            assert "gear: there is no sample of it; it is left out" in log.faults
+        else:
+            assert set(log["gear"].values) == {1.0}
+        anew = [fault for fault in log.faults if "starts anew" in fault]
+        assert len(anew) == 1
+        assert "time column 'time [s]': the clock starts anew or leaps 1 time" in anew[0]
+
+    @pytest.mark.parametrize("bus", ["can0", "can1"])
+    def test_messages_of_a_trace(self, tmp_path, bus):
+        (tmp_path / "car.dbc").write_text(DBC)
+        lines, sparse = [], ((2,), (5, 48))
+        for (seconds, v, gear), told in zip(self.DRIVES, sparse, strict=True):
+            frames = [(k / 10, "can0", LEFT, speed(v)) for k in range(int(10 * seconds))]
+            frames += [(k + 0.05, bus, BOX, bytes([gear])) for k in told]
+            lines += [f"({t:.6f}) {b} {i:03X}#{payload.hex().upper()}\n" for t, b, i, payload in sorted(frames)]
+        (tmp_path / "d.log").write_text("".join(lines))
+        log = cd.read(tmp_path / "d.log", dbc=tmp_path / "car.dbc", names=parse_names(self.NAMES, "n"))
+        assert set(log["longitudinal_speed"].values) == {10.0}
+        assert set(log["gear"].values) == {1.0}
+        assert [f for f in log.faults if "the trace: the clock starts anew or leaps 1 time" in f]
+
+    def test_buses_with_clocks_of_their_own(self, tmp_path):
+        """Frames in turn, one bus 100 s ahead of the other: nothing is left out."""
+        (tmp_path / "car.dbc").write_text(DBC)
+        lines = []
+        for k in range(300):
+            lines.append(f"({k / 10:.6f}) can0 {LEFT:03X}#{speed(10).hex().upper()}\n")
+            lines.append(f"({k / 10 + 100:.6f}) can1 {BOX:03X}#01\n")
+        (tmp_path / "d.log").write_text("".join(lines))
+        log = cd.read(tmp_path / "d.log", dbc=tmp_path / "car.dbc", names=parse_names(self.NAMES, "n"))
+        assert (len(log["longitudinal_speed"]), len(log["gear"])) == (300, 300)
+        assert not [fault for fault in log.faults if "anew" in fault]
+
+    def test_columns_one_below_the_other(self, tmp_path):
+        """As concatenated tables look: each column has its own rows, and none of them starts anew."""
+        rows = [f"{k / 10:.1f},10,\n" for k in range(300)] + [f"{k / 10:.1f},,1\n" for k in range(200)]
+        (tmp_path / "d.csv").write_text("time [s],longitudinal_speed [m/s],gear\n" + "".join(rows))
+        log = cd.read(tmp_path / "d.csv")
+        assert (len(log["longitudinal_speed"]), len(log["gear"])) == (300, 200)
+        assert not [fault for fault in log.faults if "anew" in fault]
+
+    def test_stamps_that_are_none_or_far_off(self, tmp_path):
+        stamps = [f"{k / 10:.1f}" for k in range(300)]
+        stamps[50], stamps[90] = "500.0", ""
+        text = "".join(f"{t},{k},1\n" for k, t in enumerate(stamps))
+        (tmp_path / "d.csv").write_text("time [s],longitudinal_speed [m/s],gear\n" + text)
+        log = cd.read(tmp_path / "d.csv")
+        assert sorted(set(range(300)) - set(log["longitudinal_speed"].values)) == [50, 90]
+        told = " | ".join(log.faults)
+        assert "time column 'time [s]': 1 sample with a stamp far from its neighbours' left out (500 s)" in told
+        assert "1 sample without a time stamp left out" in told
 
 
 def test_counts_read_as_words():

@@ -2,7 +2,7 @@
 
 A message may reach a trace more than once: on several buses through a gateway, or, in J1939, from several source
 addresses. Its signals are then taken from the stream with the most frames, and a fault says which; mixing them would
-make two quantities one.
+make two quantities one. Where the trace's clock starts anew, all messages keep the same stretch (`codriver.logs.clock`).
 """
 
 from __future__ import annotations
@@ -10,9 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
+
 from codriver.errors import LogError
 from codriver.logs.can_bits import take
 from codriver.logs.can_streams import Stream, find_streams, list_streams, name_identifier
+from codriver.logs.clock import breaks, shared_run
 from codriver.logs.dbc import Database, MessageLayout, decode, load_database
 from codriver.logs.frames import Frames
 from codriver.logs.recording import RawSignal, Recording, SourceChannel
@@ -42,6 +46,7 @@ class CanRecording(Recording):
     ) -> None:
         self.path, self.format, self.frames, self.faults = path, format, frames, faults
         streams = _on_bus(path, find_streams(frames), bus)
+        streams = _one_run(frames, streams, self.faults)
         if dbc is None:
             raise LogError(
                 f"{path} is a raw CAN trace of {sum(map(len, streams))} frames with {len(streams)} identifiers: "
@@ -155,6 +160,36 @@ def _on_bus(path: str, streams: list[Stream], bus: int | None) -> list[Stream]:
             "give one of them with --bus, or none to take all",
         )
     return kept
+
+
+def _one_run(frames: Frames, streams: list[Stream], faults: list[str]) -> list[Stream]:
+    """The streams without the frames before or after a new start of their clock; what is left out is told."""
+    if not breaks(frames.time).size:
+        return streams
+    kept = np.ones(len(frames), bool)
+    for group in _clocks(frames, streams):
+        rows = _rows(group)
+        kept[rows], notes = shared_run(frames.time[rows], (np.searchsorted(rows, stream.rows) for stream in group))
+        faults.extend(f"the trace{_on(group, streams)}: {note}" for note in notes)
+    left = [Stream(s.bus, s.identifier, s.extended, s.rows[kept[s.rows]]) for s in streams]
+    return [stream for stream in left if len(stream)]
+
+
+def _clocks(frames: Frames, streams: list[Stream]) -> list[list[Stream]]:
+    """The streams by clock: the buses of a trace share one, unless their frames in turn make it jump."""
+    buses = [[stream for stream in streams if stream.bus == bus] for bus in sorted({stream.bus for stream in streams})]
+    alone = max(breaks(frames.time[_rows(group)]).size for group in buses)
+    return [streams] if breaks(frames.time[_rows(streams)]).size <= alone else buses
+
+
+def _rows(streams: list[Stream]) -> npt.NDArray[np.int64]:
+    """The places in the trace of the frames of some streams, ascending."""
+    return np.sort(np.concatenate([stream.rows for stream in streams]))
+
+
+def _on(group: list[Stream], streams: list[Stream]) -> str:
+    """The bus of a group, for messages; nothing where it is all there is."""
+    return f" on bus {group[0].bus}" if len(group) < len(streams) else ""
 
 
 def _find_messages(database: Database, streams: list[Stream]) -> dict[str, list[Stream]]:

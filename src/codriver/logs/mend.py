@@ -1,4 +1,4 @@
-"""Faults of a recorded signal: those that can be mended, and those that can only be told."""
+"""Faults of a recorded signal: those that can be mended, and those that can only be told; its clock is another matter."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy.typing as npt
 from codriver.logs.wording import counted
 from codriver.names import VOCABULARY
 from codriver.signals import Signal
-from codriver.signals.signal import Array
 
 # A measured analogue signal that shows one value for this long while others move is called stuck.
 STUCK_SECONDS = 5.0
@@ -19,95 +18,10 @@ STUCK_SECONDS = 5.0
 CODES_AT_MOST = 3
 # A clock that is this far from the others' is another clock, and no pause.
 OTHER_CLOCK = 3600.0
-# A clock that steps back by more than this began anew; by less, samples merely swapped places. s.
-RESTART = 1.0
-# And one that leaps ahead by more than this is another clock, or another day. s.
-LEAP = 3 * 3600.0
 LATE = 2.0  # s
 ABSURD = 10.0  # times the largest value that the quantity can plausibly have
 REST_PRESSURE = 0.3e5  # Pa
 _ANALOGUE = {"longitudinal_acceleration", "lateral_acceleration", "yaw_rate", "roll_rate", "pitch_rate"}
-
-
-def mend_clock(time: Array, values: Array) -> tuple[Array, Array, list[str]]:
-    """Make a clock run forward.
-
-    Samples without a finite stamp are left out. Where time runs backwards a little (two threads writing one file) the
-    samples are sorted. Where it runs backwards by more than `RESTART` the clock began anew (two drives in one file):
-    the run that lasts longest is kept, since sorting would mix the drives. A single stamp that far off is no new clock;
-    its sample is left out. Of several values with one stamp the last is kept.
-
-    Returns:
-        time, values, and a sentence for each kind of fault mended.
-    """
-    notes = []
-    finite = np.isfinite(time)
-    if not finite.all():
-        notes.append(f"{counted(int((~finite).sum()), 'sample')} without a time stamp left out")
-        time, values = time[finite], values[finite]
-    if (np.diff(time) < -RESTART).any():
-        astray = _astray(time)
-        if astray.any():
-            shown = ", ".join(f"{stamp:.10g}" for stamp in time[astray][:3]) + (", ..." if astray.sum() > 3 else "")
-            notes.append(
-                f"{counted(int(astray.sum()), 'sample')} with a stamp far from its neighbours' left out ({shown} s)"
-            )
-            time, values = time[~astray], values[~astray]
-    if _breaks(time).size:
-        runs = np.split(np.arange(time.size), _breaks(time) + 1)
-        kept = _joined(time, runs)
-        left = [_span(time[run]) for run in runs if not np.isin(run[0], kept)]
-        notes.append(
-            f"the clock starts anew or leaps {counted(len(runs) - 1, 'time')}, as where drives are joined in one "
-            f"file: the longest run, {_span(time[kept])}, is kept; left out: {', '.join(left[:4])}"
-            + (f" and {len(left) - 4} more" if len(left) > 4 else "")
-        )
-        time, values = time[kept], values[kept]
-    backwards = np.flatnonzero(np.diff(time) < 0)
-    if backwards.size:
-        worst = float((time[backwards] - time[backwards + 1]).max())
-        often = "once, by" if backwards.size == 1 else f"{backwards.size} times, by up to"
-        notes.append(f"time runs backwards {often} {worst:.3g} s; samples sorted by time")
-        order = np.argsort(time, kind="stable")
-        time, values = time[order], values[order]
-    last = np.append(np.diff(time) > 0, True) if time.size else np.zeros(0, bool)
-    if not last.all():
-        double = counted(int((~last).sum()), "sample", "shares", "share")
-        notes.append(f"{double} a time stamp with the next; the last of each is kept")
-        time, values = time[last], values[last]
-    return time, values, notes
-
-
-def _breaks(time: Array) -> npt.NDArray[np.intp]:
-    """Indices after which the clock starts anew or leaps."""
-    steps = np.diff(time)
-    return np.flatnonzero((steps < -RESTART) | (steps > LEAP))
-
-
-def _joined(time: Array, runs: list[npt.NDArray[np.intp]]) -> npt.NDArray[np.intp]:
-    """The longest run, with those before and after it that its clock goes on from (a stretch between had another clock)."""
-    longest = max(range(len(runs)), key=lambda k: float(np.ptp(time[runs[k]])))
-    kept = [runs[longest]]
-    for run in runs[longest + 1 :]:
-        if 0 < time[run[0]] - time[kept[-1][-1]] < LEAP:
-            kept.append(run)
-    for run in reversed(runs[:longest]):
-        if 0 < time[kept[0][0]] - time[run[-1]] < LEAP:
-            kept.insert(0, run)
-    return np.concatenate(kept)
-
-
-def _astray(time: Array) -> npt.NDArray[np.bool_]:
-    """Single stamps more than `RESTART` before or after both neighbours, which are themselves in order."""
-    astray = np.zeros(time.size, bool)
-    before, it, after = time[:-2], time[1:-1], time[2:]
-    astray[1:-1] = (after >= before) & ((it < before - RESTART) | (it > after + RESTART))
-    return astray
-
-
-def _span(time: Array) -> str:
-    """From the first to the last stamp, for messages."""
-    return f"{time.min():.10g} to {time.max():.10g} s"
 
 
 def drop_codes(signal: Signal) -> tuple[Signal, list[str]]:

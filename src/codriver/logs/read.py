@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from codriver.errors import LogError, NamesError, UnitError
+from codriver.logs.clock import mend_clock
 from codriver.logs.mean import mean_of
-from codriver.logs.mend import compare_clocks, drop_codes, find_faults, mend_clock, named
+from codriver.logs.mend import compare_clocks, drop_codes, find_faults, named
 from codriver.logs.names_file import Entry, NamesFile, load_names
 from codriver.logs.recording import RawSignal, Recording
 from codriver.logs.registry import ReadOptions, find_reader
@@ -96,6 +97,7 @@ def read_recording(recording: Recording, names: str | Path | NamesFile | None = 
             if names is not None:  # known layouts and columns with standard names may rely on SI units
                 faults.extend(entry.doubts({source: part.unit for source, part in there.items()}))
             signals.append(_standard(entry, there, raw.get(entry.valid or ""), faults))
+    faults.extend(f"{named(s.name, s.source)}: there is no sample of it; it is left out" for s in signals if not len(s))
     signals = [signal for signal in signals if len(signal)]
     if not signals:
         raise (LogError if names is None else NamesError)(

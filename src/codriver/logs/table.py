@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from codriver.errors import FormatError, LogError
+from codriver.logs.clock import shared_run
 from codriver.logs.csv_layout import EMPTY_CELLS, inflate, look
 from codriver.logs.recording import RawSignal, Recording, SourceChannel
 from codriver.logs.registry import ReadOptions, reader
@@ -59,7 +60,13 @@ class TableRecording(Recording):
         stamps = seconds(columns[self._clock], self._clock_unit, self._clock, notes)
         for note in notes:
             self._tell(note)
-        made = {header: _samples(stamps, columns[header]) for header in set(wanted.values())}
+        headers = set(wanted.values())
+        kept, notes = shared_run(stamps, (columns[header].is_valid().to_numpy() for header in headers))
+        if notes:
+            stamps, columns = stamps[kept], {header: columns[header].filter(kept) for header in headers}
+        for note in notes:
+            self._tell(f"time column '{self._clock}': {note}")
+        made = {header: _samples(stamps, columns[header]) for header in headers}
         return {name: RawSignal(*made[header], self._channels[header].unit) for name, header in wanted.items()}
 
     @abstractmethod
