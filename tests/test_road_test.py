@@ -483,7 +483,10 @@ def test_written_drives_read_back(command, tmp_path):
         np.testing.assert_allclose(log[name].time, signal_.time, atol=2e-6)
     truth = read(folder / "truth.parquet")
     np.testing.assert_allclose(truth["intentional_jerk"].values, made.truth["intentional_jerk"].values)
-    assert command("road-test", "-o", folder, "--duration", 2)[0] == 0  # again, over its own
+    code, _, err = command("road-test", "-o", folder, "--duration", 2)
+    assert code == 2
+    assert "--overwrite" in err
+    assert command("road-test", "-o", folder, "--duration", 2, "--overwrite")[0] == 0
 
 
 def test_the_track_comes_with_a_vehicle(command, tmp_path):

@@ -24,36 +24,54 @@ Duration = Annotated[
 ]
 
 
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier simulation in that folder.")]
+
+
 @app.command("road-test")
-def road_test(out: Out, driver: Driver = "ordinary", seed: Seed = 1, duration: Duration = None) -> None:
+def road_test(
+    out: Out, driver: Driver = "ordinary", seed: Seed = 1, duration: Duration = None, overwrite: Overwrite = False
+) -> None:
     """Drive 53 km of town, country and motorway, some 42 minutes, with the car of the 2017 paper.
 
     Example: codriver simulate road-test -o drive --driver smooth
     """
     from codriver.simulate import road_test
 
-    _simulate(out, lambda: road_test(driver, seed, duration=duration), "bisoffi2017", None)
+    _simulate(out, lambda: road_test(driver, seed, duration=duration), "bisoffi2017", None, overwrite)
 
 
 @app.command("track")
-def track(out: Out, driver: Driver = "ordinary", seed: Seed = 1, duration: Duration = None) -> None:
+def track(
+    out: Out, driver: Driver = "ordinary", seed: Seed = 1, duration: Duration = None, overwrite: Overwrite = False
+) -> None:
     """Drive two laps of a handling track with the car of the 2015 paper; writes its nominal vehicle.toml too.
 
     Example: codriver simulate track -o laps
     """
     from codriver.simulate import nominal_2015, track_test
 
-    _simulate(out, lambda: track_test(driver, seed, duration=duration), str(out / "vehicle.toml"), nominal_2015())
+    _simulate(
+        out, lambda: track_test(driver, seed, duration=duration), str(out / "vehicle.toml"), nominal_2015(), overwrite
+    )
 
 
-def _simulate(out: Path, drive: Callable[[], RoadTest], vehicle: str, nominal: Vehicle | None) -> None:
+def _simulate(
+    out: Path, drive: Callable[[], RoadTest], vehicle: str, nominal: Vehicle | None, overwrite: bool
+) -> None:  # fmt: skip
     """Simulate, write, and say what was written and how to estimate from it."""
     import shlex
 
     from codriver.cli.terminal import console, working
+    from codriver.errors import UsageError
     from codriver.simulate import refuse_foreign, write_drive
 
     refuse_foreign(out, "simulated drive")
+    if not overwrite and out.is_dir() and any(out.iterdir()):
+        raise UsageError(
+            f"--out {out} holds an earlier simulation",
+            "a new or empty folder",
+            "choose another --out, or say --overwrite",
+        )
     with working(True, 2) as stage:
         stage("driving")
         test = drive()

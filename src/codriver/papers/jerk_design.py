@@ -53,7 +53,7 @@ def design_chapter(preset: str, ells: tuple[float, ...], places: Places) -> Chap
              "rank of the observability matrix"),
         Item(f"{places.lost}: with slope and bias as two states it is not", "not observable", f"rank {split} of 5", "",
              split < 5, "rank of the observability matrix, o_a split into g alpha and the bias"),
-        Item("gain L_K for the paper's Q and R", None, gain, "1", gain < 1e-4,
+        Item("gain L_K for the paper's Q and R", None, f"agrees to {gain:.0e}", "", gain < 1e-4,
              "the paper prints none; greatest difference from an independent solution of the Riccati equation"),
         Item(f"{places.gain}: the right factor of L", places.printed_factor, "diag(1, ell)", "", fits,
              "as printed" if fits else "there are two measurements, so the printed factor does not fit; this one scales"),

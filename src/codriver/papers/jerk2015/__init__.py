@@ -10,7 +10,7 @@ from pathlib import Path
 
 from codriver.papers.drives import Driven, Job, Order, drives
 from codriver.papers.item import Item
-from codriver.papers.jerk2015.shifts import shifts_chapter
+from codriver.papers.jerk2015.shifts import Run, shifts_chapter
 from codriver.papers.jerk2015.states import states_chapter
 from codriver.papers.jerk2015.zoe import zoe_chapter
 from codriver.papers.jerk_design import Places, design_chapter
@@ -21,14 +21,14 @@ from codriver.report.document import Table
 from codriver.simulate import nominal_2015
 from codriver.simulate.car_parameters import PRINTED_2015, ROLLING_RADIUS_2015
 from codriver.simulate.compare import compare, run_estimators
-from codriver.vehicles import load_vehicle
+from codriver.vehicles import Vehicle, load_vehicle
 
 VEHICLE = PRESET = "bisoffi2015"
 ELLS = (0.8, 1.4, 2.0)
 MIDDLE = 1.4
 ESTIMATORS = ("intent-torque", "kinematic")
 PLACES = Places("eq. (11)", "remark 4", "eq. (18)", "eq. (19)", "diag(1, ell)")
-JOBS = (Job("ordinary", 1), Job("brisk", 2), Job("aggressive", 3))
+JOBS = tuple(Job(style, k) for k, style in enumerate(("ordinary", "brisk", "aggressive", "smooth", "anticipating"), 1))
 
 
 def reproduce(tell: Tell, quick: bool, recordings: Path | None) -> Reproduction:
@@ -39,6 +39,7 @@ def reproduce(tell: Tell, quick: bool, recordings: Path | None) -> Reproduction:
     first = driven[0]
     tell("estimating")
     own = run_estimators(first.log, car, ESTIMATORS, ELLS, preset=PRESET)
+    runs = [_run(drive, car) for drive in driven]
     intent = {ell: own["intent-torque", ell] for ell in ELLS}
     kinematic = {ell: own["kinematic", ell] for ell in ELLS}
     tell("judging")
@@ -46,7 +47,7 @@ def reproduce(tell: Tell, quick: bool, recordings: Path | None) -> Reproduction:
         design_chapter(PRESET, ELLS, PLACES),
         _parameters(first),
         states_chapter(first, intent, kinematic[MIDDLE]),
-        shifts_chapter(first, intent[MIDDLE], kinematic[MIDDLE], car),
+        shifts_chapter(runs),
         judged_chapter(driven, ELLS, "intent-torque", limits=False),
         zoe_chapter(recordings),
     )
@@ -59,6 +60,12 @@ def reproduce(tell: Tell, quick: bool, recordings: Path | None) -> Reproduction:
         chapters,
         (("drives", f"{len(driven)} of two laps, one a driver"), ("car and noise", f"{VEHICLE}, ell = 0.8, 1.4, 2")),
     )
+
+
+def _run(driven: Driven, car: Vehicle) -> Run:
+    """A drive with its estimates at the middle ell."""
+    made = run_estimators(driven.log, car, ESTIMATORS, (MIDDLE,), preset=PRESET)
+    return Run(driven, made["intent-torque", MIDDLE], made["kinematic", MIDDLE])
 
 
 def _parameters(driven: Driven) -> Chapter:

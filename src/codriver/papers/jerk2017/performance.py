@@ -134,10 +134,21 @@ def _boxes(driven: Driven, middle: Estimate) -> tuple[Item, ...]:
     items = []
     for number, (name, (claim, signs)) in enumerate(claims.items(), 1):
         found = bursts(driven, middle, name)
-        said = ", ".join(f"{value:+.1f}" for value in found) or "none"
-        items.append(Item(f"fig. 4 and 5, box {number}: {claim}", claim, f"{said} m/s³", "", in_order(found, signs),
-                          f"peaks of the estimated jerk beyond {_BURST:g} m/s³ in the box, ell = 2, in order of time"))  # fmt: skip
+        items.append(Item(f"fig. 4 and 5, box {number}: {claim}", claim, _largest(found, signs), "", in_order(found, signs),
+                          f"the largest of {len(found)} peaks of the jerk beyond {_BURST:g} m/s³ in the box, ell = 2"))  # fmt: skip
     return tuple(items)
+
+
+def _largest(found: list[float], signs: tuple[int, ...]) -> str:
+    """The largest burst of the first sign, the largest of the next one after it, and so on, in words."""
+    said, rest = [], found
+    for sign in signs:
+        if not any(value * sign > 0 for value in rest):
+            break
+        k = max(range(len(rest)), key=lambda index: rest[index] * sign)
+        said.append(f"{rest[k]:+.1f}")
+        rest = rest[k + 1 :]
+    return ", then ".join(said) + " m/s³" if said else "none"
 
 
 def bursts(driven: Driven, estimate: Estimate, stretch: str) -> list[float]:
