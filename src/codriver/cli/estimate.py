@@ -81,7 +81,7 @@ def estimate_file(
         run = work or estimate_log
         result = run(name, recorded, vehicle, ell=ell, rate=rate, preset=preset, form=form)
         _refuse_empty(result)
-        check = _with_vehicle(result, recorded, vehicle)
+        check = check_with_vehicle(result, recorded, vehicle)
         stage(f"writing {out.name}" + (f" and {report.name}" if report is not None else ""))
         _write(result, check, out, report, command_line(), truth)
     told = _told(result, check, out, report, why)
@@ -146,7 +146,7 @@ def _refuse_empty(result: Estimate) -> None:
     )
 
 
-def _with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> Check:
+def check_with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> Check:
     """The verdict with what the log itself says of the vehicle's parameters, which innovations do not show."""
     check = result.check()
     if vehicle is None:
