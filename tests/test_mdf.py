@@ -72,6 +72,28 @@ def test_channels_by_standard_names(tmp_path: Path) -> None:
     np.testing.assert_allclose(log["longitudinal_speed"].values, 10.0)
 
 
+@pytest.mark.parametrize(("unit", "told"), [("m/s", 1), ("km/h", 0)])
+def test_a_name_in_two_groups(tmp_path: Path, unit: str, told: int) -> None:
+    first = [signal("longitudinal_speed", np.full(10, 10.0), unit="m/s")]
+    second = [signal("longitudinal_speed", np.full(10, 36.0), unit=unit)]
+    log = read(write(tmp_path / "drive.mf4", first, second))
+    np.testing.assert_allclose(log["longitudinal_speed"].values, 10.0)
+    faults = [
+        fault for fault in log.faults if "'longitudinal_speed@task 1' of the same name with other values" in fault
+    ]
+    assert len(faults) == told
+
+
+def test_a_name_among_frames_and_decoded_channels(tmp_path: Path) -> None:
+    parts = {"ID": np.full(10, 0x100, "u4"), "DLC": np.full(10, 8, "u1"), "DataBytes": np.ones((10, 8), "u1")}
+    frames = [signal(f"CAN_DataFrame.{name}", values) for name, values in parts.items()]
+    (tmp_path / "car.dbc").write_text(DBC)
+    path = write(tmp_path / "drive.mf4", frames, [signal("Speed.V", np.zeros(10), unit="km/h")])
+    recording = open_recording(path, dbc=tmp_path / "car.dbc")
+    np.testing.assert_allclose(recording.load(["Speed.V"])["Speed.V"].values, 2.57)
+    assert f"'Speed.V' is there more than once; that of {recording.format} is taken" in recording.faults
+
+
 DBC = """VERSION ""
 NS_ :
 BS_:

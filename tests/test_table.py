@@ -10,7 +10,10 @@ import pytest
 
 from codriver import errors
 from codriver.logs import open_recording, read
+from codriver.logs.csv_layout import unique
+from codriver.logs.names_file import NamesFile, parse_names
 from codriver.logs.recording import RawSignal
+from codriver.signals import Log
 
 TIME = np.arange(5) * 0.1
 
@@ -158,6 +161,59 @@ def test_stamps_since_1970_are_fresh_on_every_tick(tmp_path: Path) -> None:
     path = tmp_path / "drive.csv"
     path.write_text("time,gear\n" + "".join(f"{1_700_000_000.123456 + k / 100:.6f},1\n" for k in range(5000)))
     assert read(path).sample(["gear"], 0.01).fresh["gear"].all()
+
+
+class TestNamesakes:
+    """Two columns of one name: the first is taken, and it is told where the other one says something else."""
+
+    TOLD = "is taken, and the recording has"
+    NAMES = parse_names('[longitudinal_speed]\nsource = "speed"\nunit = "m/s"\n', "n")
+
+    def read(self, path: Path, headers: tuple[str, str], second: float, names: NamesFile | None = None) -> Log:
+        if path.suffix == ".parquet":
+            arrays = [pa.array(TIME), pa.array(TIME), pa.array(second * TIME)]
+            pq.write_table(pa.Table.from_arrays(arrays, names=["time", *headers]), path)
+        else:
+            rows = "".join(f"{t},{t},{second * t}\n" for t in TIME)
+            path.write_text(f"time,{','.join(headers)}\n{rows}")
+        return read(path, names=names)
+
+    @pytest.mark.parametrize("name", ["d.csv", "d.parquet"])
+    @pytest.mark.parametrize(
+        ("headers", "second", "other", "mapped"),
+        [
+            (("longitudinal_speed", "longitudinal_speed"), 2, "longitudinal_speed#2", False),
+            (("longitudinal_speed", "longitudinal_speed"), 1, "", False),
+            (("longitudinal_speed [m/s]", "longitudinal_speed [km/h]"), 1, "longitudinal_speed [km/h]", False),
+            (("longitudinal_speed [m/s]", "longitudinal_speed [km/h]"), 3.6, "", False),
+            (("speed", "speed"), 2, "speed#2", True),
+            (("speed", "speed"), 1, "", True),
+            (("speed [m/s]", "speed [m/s]"), 2, "speed [m/s]#2", True),
+            (("speed", "speed [km/h]"), 2, "", True),  # the names file says which
+        ],
+    )
+    def test_columns(self, tmp_path, name, headers, second, other, mapped) -> None:
+        log = self.read(tmp_path / name, headers, second, self.NAMES if mapped else None)
+        np.testing.assert_allclose(log["longitudinal_speed"].values, TIME)
+        told = [fault for fault in log.faults if self.TOLD in fault]
+        assert len(told) == bool(other)
+        assert all(
+            f"'{headers[0]}' {self.TOLD} '{other}' of the same name with other values" in fault for fault in told
+        )
+
+    def test_the_second_can_be_asked_for(self, tmp_path) -> None:
+        names = parse_names('[longitudinal_speed]\nsource = "speed#2"\nunit = "m/s"\n', "n")
+        for name in ("d.csv", "d.parquet"):
+            log = self.read(tmp_path / name, ("speed", "speed"), 2, names)
+            np.testing.assert_allclose(log["longitudinal_speed"].values, 2 * TIME)
+            assert not [fault for fault in log.faults if self.TOLD in fault]
+
+    def test_names_stay_different(self) -> None:
+        assert unique(["a", "a#2", "a", "", "a"]) == ("a", "a#2", "a#3", "column 4", "a#4")
+
+    def test_a_source_listed_twice(self) -> None:
+        with pytest.raises(errors.NamesError, match="lists 'speed' more than once"):
+            parse_names('[longitudinal_speed]\nsource = ["speed", "speed"]\n', "n")
 
 
 def test_gzip_whole_and_cut_off(tmp_path: Path) -> None:

@@ -134,12 +134,16 @@ def look(path: Path) -> CsvLayout:
 
 def unique(headers: list[str]) -> tuple[str, ...]:
     """Names that differ: an empty one becomes "column 3", a second "speed" becomes "speed#2"."""
-    seen: dict[str, int] = {}
-    names = []
+    taken = set(headers)
+    names: list[str] = []
     for index, header in enumerate(headers):
-        name = header or f"column {index + 1}"
-        seen[name] = seen.get(name, 0) + 1
-        names.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
+        name, count = header or f"column {index + 1}", 1
+        if name in names:
+            while f"{name}#{count}" in taken or count == 1:
+                count += 1
+            name = f"{name}#{count}"
+            taken.add(name)
+        names.append(name)
     return tuple(names)
 
 

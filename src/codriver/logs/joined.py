@@ -32,6 +32,11 @@ class JoinedRecording(Recording):
     def load(self, names: Iterable[str]) -> dict[str, RawSignal]:
         """The samples of the channels named, each from the first part that has it."""
         missing, loaded = set(names), {}
+        for name in sorted(missing):
+            holders = [part.format for part in self._parts if name in part.channels()]
+            told = f"'{name}' is there more than once; that of {holders[0]} is taken" if len(holders) > 1 else ""
+            if told and told not in self.faults:
+                self.faults.append(told)
         for part in self._parts:
             found = part.load(missing & set(part.channels()))
             loaded.update(found)

@@ -150,6 +150,10 @@ def _entry(name: str, table: Any, faults: list[str]) -> Entry | None:
     sources = (source,) if isinstance(source, str) else tuple(source) if isinstance(source, list) else ()
     if not sources or not all(isinstance(s, str) and s for s in sources):
         faults.append(f"[{name}] source must be the name of a channel, or a list of them")
+    twice = sorted({str(s) for s in sources if sources.count(s) > 1})
+    faults.extend(
+        f"[{name}] source lists '{s}' more than once, which would count it so often in the mean" for s in twice
+    )
     for key in ("scale", "offset"):
         number = table.get(key, 1.0)
         if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from codriver.logs.clock import mend_clock
 from codriver.logs.mean import mean_of
 from codriver.logs.mend import compare_clocks, drop_codes, find_faults, named
 from codriver.logs.names_file import Entry, NamesFile, load_names
+from codriver.logs.namesakes import own_name, tell_namesakes
 from codriver.logs.recording import RawSignal, Recording
 from codriver.logs.registry import ReadOptions, find_reader
 from codriver.names import VOCABULARY, nearest
@@ -70,6 +70,7 @@ def read_recording(recording: Recording, names: str | Path | NamesFile | None = 
         names if isinstance(names, NamesFile) else load_names(names) if names is not None else recording.default_names
     )
     channels = recording.channels()
+    own = mapping is None
     if mapping is None:
         mapping = own_names(recording)
     if not mapping.entries:
@@ -82,6 +83,7 @@ def read_recording(recording: Recording, names: str | Path | NamesFile | None = 
     faults: list[str] = []
     wanted = {channel for entry in mapping.entries.values() for channel in entry.channels}
     raw = recording.load(wanted)
+    faults += tell_namesakes(recording, mapping, raw, own)
     signals = []
     for entry in mapping.entries.values():
         absent = [channel for channel in entry.channels if channel not in raw]
@@ -116,8 +118,7 @@ def own_names(recording: Recording) -> NamesFile:
     """The mapping of channels that bear standard names themselves: "time,longitudinal_speed,..." or "Message.gear"."""
     entries: dict[str, Entry] = {}
     for name in recording.channels():
-        # Without the unit of a header or the group of an MDF channel; a unit may hold a point: "[N.m]".
-        short = re.split(r"[\[(@]", name)[0].strip().rsplit(".", 1)[-1]
+        short = own_name(name)
         if short in VOCABULARY and short not in entries:
             entries[short] = Entry(short, (name,))
     return NamesFile(entries, "the channels' own names")

@@ -16,7 +16,7 @@ import numpy as np
 
 from codriver.errors import FormatError, LogError
 from codriver.logs.clock import shared_run
-from codriver.logs.csv_layout import EMPTY_CELLS, inflate, look
+from codriver.logs.csv_layout import EMPTY_CELLS, inflate, look, unique
 from codriver.logs.recording import RawSignal, Recording, SourceChannel
 from codriver.logs.registry import ReadOptions, reader
 from codriver.logs.table_clock import find_clock, seconds, split_unit
@@ -234,6 +234,11 @@ class ParquetRecording(TableRecording):
             raise LogError(f"{path} has {len(schema)} columns and no rows", "rows of data", "check how it was written")
         dates = [pa.types.is_temporal(field.type) for field in schema]
         index, unit = find_clock(schema.names, dates, str(path))
+        headers = unique(schema.names)
+        self._place = {
+            header: (name, schema.names[:i].count(name))
+            for i, (header, name) in enumerate(zip(headers, schema.names, strict=True))
+        }
         channels, skipped = [], []
         numeric = (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean, pa.types.is_decimal)
         for i, field in enumerate(schema):
@@ -241,10 +246,10 @@ class ParquetRecording(TableRecording):
                 unit = unit or _note(field, "unit")
             elif any(test(field.type) for test in numeric):
                 own = _note(field, "unit") or split_unit(field.name)[1]
-                channels.append(SourceChannel(field.name, own, _note(field, "comment")))
+                channels.append(SourceChannel(headers[i], own, _note(field, "comment")))
             elif not field.name.startswith("__index_level"):
                 skipped.append(field.name)
-        super().__init__(path, "Parquet table", schema.names[index], unit, channels)
+        super().__init__(path, "Parquet table", headers[index], unit, channels)
         if skipped:
             self._tell(
                 f"{counted(len(skipped), 'column', 'is', 'are')} not numeric and left out: {', '.join(skipped[:8])}"
@@ -254,12 +259,16 @@ class ParquetRecording(TableRecording):
         import pyarrow as pa
 
         try:
-            table = self._table.read(columns=headers)
+            table = self._table.read(columns=sorted({self._place[header][0] for header in headers}))
         except (pa.ArrowException, OSError) as error:
             raise FormatError(
                 f"{self.path}: {str(error)[:160]}", "a readable Parquet file", "the file is damaged; write it anew"
             ) from None
-        return {header: table[header] for header in headers}
+        places = {header: self._place[header] for header in headers}
+        return {
+            header: table.column(table.schema.get_all_field_indices(name)[nth])
+            for header, (name, nth) in places.items()
+        }
 
 
 def _note(field: pa.Field, key: str) -> str:
