@@ -14,7 +14,19 @@ from typing import Annotated
 import typer
 
 from codriver import __version__
-from codriver.cli import check, demo, estimate, export, identify, info, reproduce, simulate, smooth, style, tune
+from codriver.cli import (
+    check,
+    demo,
+    estimate,
+    export,
+    identify_steering,
+    info,
+    reproduce,
+    simulate,
+    smooth,
+    style,
+    tune,
+)
 from codriver.errors import CodriverError
 
 app = typer.Typer(
@@ -30,7 +42,7 @@ app.command("demo")(demo.demo)
 app.command("info")(info.info)
 app.command("estimate")(estimate.estimate)
 app.command("smooth")(smooth.smooth)
-app.add_typer(identify.app, name="identify")
+app.add_typer(identify_steering.app, name="identify")
 app.command("tune")(tune.tune)
 app.command("style")(style.style)
 app.add_typer(check.app, name="check")

@@ -12,17 +12,20 @@ A slope that stands below its standard errors, or commands that do not differ, a
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from codriver.errors import LogError
+from codriver.errors import FormatError, LogError
 from codriver.signals.signal import Array
 from codriver.vehicles import Vehicle
 
 GRAVITY = 9.81  # m/s^2, the paper's
 RADIUS = 0.14  # m, of the paper's wheel
 LEAST = 3  # weighings
+COLUMNS = ("command", "mass", "radius")
 SURE = 0.1  # greatest standard error, as a share of the scale
 
 
@@ -114,3 +117,31 @@ def identify_torque_scale(
         float(scale), float(middle - scale * mean), sd, float(np.sqrt(variance * (1 / n + mean**2 / spread))),
         float(scale) - half, float(scale) + half, float(np.sqrt(variance)), 1 - float(e @ e) / total, bent, command, torque, source,
     )  # fmt: skip
+
+
+def read_weighings(path: str | Path) -> tuple[Array, Array, Array | None]:
+    """Weighings from a CSV file: a header with `command`, `mass` (kg) and perhaps `radius` (m), then a row each.
+
+    Returns:
+        command, mass, and radius or None.
+
+    Raises:
+        FormatError: a column is missing, or a cell is no number.
+    """
+    name = Path(path).name
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+        rows = list(csv.DictReader(text.splitlines(), skipinitialspace=True))
+        columns = {key: [float(row[key]) for row in rows] for key in (rows[0] if rows else {}) if key in COLUMNS}
+    except (UnicodeDecodeError, ValueError, TypeError, csv.Error) as error:
+        raise FormatError(
+            f"{name}: {error}", "a number in every cell", "correct the file; decimals have a point"
+        ) from None
+    lacking = [key for key in COLUMNS[:2] if key not in columns]
+    if lacking:
+        raise FormatError(
+            f"{name} has no column {' and no '.join(lacking)}, or no rows", "a header command,mass (kg) and perhaps radius (m)",
+            "name the columns so, one row a weighing",
+        )  # fmt: skip
+    command, mass = (np.array(columns[key]) for key in COLUMNS[:2])
+    return command, mass, np.array(columns["radius"]) if "radius" in columns else None

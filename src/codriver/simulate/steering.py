@@ -25,7 +25,7 @@ from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
 
 READINGS = ("step", "continuous", "derivative")
-SUBSTEPS = 20  # a tick, where there is an end stop
+SUBSTEPS = 20  # a tick, where there is friction or an end stop
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ class _Plant:
 
     def __init__(self, setting: WheelSetting) -> None:
         wheel = setting.wheel
-        self.wheel, self.count = wheel, SUBSTEPS if np.isfinite(wheel.end_stop) else 1
+        self.wheel, self.count = wheel, SUBSTEPS if np.isfinite(wheel.end_stop) or wheel.friction else 1
         try:
             self.tick = tick_of(wheel.inertia, wheel.damping, setting.dt / self.count, setting.plant)
         except ValueError as error:
