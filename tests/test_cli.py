@@ -174,6 +174,33 @@ class TestInfo:
         ).summary
         assert [s["name"] for s in told["signals"]] == ["longitudinal_speed"]
 
+    def test_a_flag_is_no_speed(self, run, tmp_path):
+        """Called a speed, and a flag, a limit, an accuracy: the channel with values is proposed, its flag beside it."""
+        n = np.arange(300)
+        columns = {
+            "time": n / 10, "SpeedValid": n > 20, "SpeedLimit": 50 + 0 * n, "SpeedAccuracy": n % 7 / 7.0, "EngineSpeed": 900.0 + n,
+            "CoolingSpeed [rpm]": 10.0 + n, "Speed": 10 + n / 30, "Gear": n % 5,
+        }  # fmt: skip
+        log = csv(tmp_path / "d.csv", columns)
+        text = run("info", log, "--json").summary["names_file_begins"]
+        assert 'source = "Speed"  # 300 different values, 10 to 19.97\n' in text
+        assert 'unit = "km/h"  # the recording says none: which is it?' in text
+        assert 'valid = "SpeedValid"' in text
+        (tmp_path / "n.toml").write_text(text)
+        told = run("info", log, "--names", tmp_path / "n.toml", "--json").summary
+        assert told["signals"][0]["samples"] == 279
+        assert "21 of 300 values left out, where SpeedValid is 0" in " ".join(told["faults"])
+
+    def test_no_speed_at_all(self, run, tmp_path):
+        columns = {
+            "time": np.arange(30.0),
+            "Flow [g/s]": np.arange(30.0),
+            "Speed": np.arange(30) % 2,
+            "a": np.arange(30.0),
+        }
+        ran = run("info", csv(tmp_path / "d.csv", columns))
+        assert "none of the channels looks like the vehicle's speed" in ran.out
+
     @pytest.mark.parametrize(
         ("gears", "reverse", "severity", "said"),
         [

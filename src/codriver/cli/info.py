@@ -16,6 +16,7 @@ def info(
     """Say what a log holds, which estimators it can feed, what is missing, and which is the best available."""
     from codriver.cli.options import check_inputs
     from codriver.logs import open_recording
+    from codriver.logs.propose import propose_names
     from codriver.logs.read import own_names, read_recording
     from codriver.observers.feed import best, feeds, least_demanding
     from codriver.observers.gears import unknown_gears
@@ -26,8 +27,10 @@ def info(
     car = load_vehicle(vehicle) if vehicle is not None else None
     recording = open_recording(log, dbc=dbc, bus=bus)
     channels = recording.channels()
+    begins = None
     if names is None and recording.default_names is None and not own_names(recording).entries:
         signals = Log({}, str(log), tuple(recording.faults), tuple(sorted(channels)))  # nothing is mapped yet
+        begins = propose_names(recording)
     else:
         signals = read_recording(recording, names)
     # Without a vehicle, say what the log alone allows: parameters are told apart from signals.
@@ -44,6 +47,7 @@ def info(
         "signals": [signal.to_dict() for signal in signals.values()],
         "channels": [{"name": c.name, "unit": c.unit} for c in channels.values()],
         "unmapped": list(signals.unmapped),
+        "names_file_begins": begins,
         "faults": list(signals.faults),
         "findings": [{"severity": f.severity, "text": f.text} for f in unknown_gears(signals, car)] if car else [],
         "estimators": [
@@ -100,7 +104,10 @@ def _show(summary: dict[str, Any]) -> None:
         out.print(table)
     else:
         out.print("no channel has a standard name: say in a names file which is which, and give it with --names")
-        out.print(escape(_example(summary["channels"])))
+        out.print("it begins like this (docs/names.md has the standard names):\n")
+        out.print(
+            "".join(f"  {line}\n" for line in summary["names_file_begins"].splitlines()), markup=False, soft_wrap=True
+        )
     if summary["unmapped"]:
         # Whoever has still to write a names file wants the whole list.
         most = 24 if summary["signals"] else 300
@@ -137,16 +144,3 @@ def _show(summary: dict[str, Any]) -> None:
             f"\nno estimator can be fed: {least['name']}, which needs the least, lacks "
             + " and ".join(least["missing_signals"])
         )
-
-
-def _example(channels: list[dict[str, str]]) -> str:
-    """The beginning of a names file for these channels."""
-    likely = [c for c in channels if "speed" in c["name"].lower() and "engine" not in c["name"].lower()]
-    vehicle = [c for c in likely if "vehicle" in c["name"].lower()]
-    chosen = next(iter([*vehicle, *likely, *channels]), {"name": "Message.Signal", "unit": ""})
-    unit, doubt = chosen["unit"] or "km/h", "" if chosen["unit"] else "  # the recording says none: which is it?"
-    source = json_module.dumps(chosen["name"], ensure_ascii=False)
-    return (
-        "it begins like this (docs/names.md has the standard names):\n\n"
-        f"  [longitudinal_speed]\n  source = {source}\n  unit = {json_module.dumps(unit, ensure_ascii=False)}{doubt}\n"
-    )
