@@ -6,7 +6,6 @@ import base64
 import gzip
 import json
 import re
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +34,7 @@ from codriver.drivers.pedal import reversals
 from codriver.drivers.position import Path as Line
 from codriver.drivers.position import has_position, path_of, place, project
 from codriver.drivers.resampling import block_index, interval, quantile_intervals
-from codriver.drivers.scale import features_of, scores
+from codriver.drivers.scale import features_of, scores, sure
 from codriver.drivers.scale_file import parse_scale, scale_text
 from codriver.drivers.threshold import greatest_response, impulse_response
 from codriver.errors import LogError, MissingSignal, UsageError
@@ -548,17 +547,26 @@ def files(driven, tmp_path_factory):
     return {s: write_log(folder / f"{s}.parquet", driven[s, 1][3]) for s in ("aggressive", "smooth")}
 
 
-class TestCommand:
-    def run(self, *words: object, code: int = 0) -> str:
-        program = [str(Path(sys.executable).parent / "codriver"), "style", *map(str, words)]
-        ran = subprocess.run(program, capture_output=True, text=True)
-        assert ran.returncode == code, ran.stdout + ran.stderr
-        assert "Traceback" not in ran.stderr
-        return ran.stdout if code == 0 else ran.stderr
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Runs `codriver style` in this process; what it printed, or its error where another exit code is expected."""
+    from codriver.cli import main
 
-    def test_all_of_it(self, files, tmp_path):
+    def call(*words: object, code: int = 0) -> str:
+        monkeypatch.setattr(sys, "argv", ["codriver", "style", *map(str, words)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        said = capsys.readouterr()
+        assert end.value.code == code, said.out + said.err
+        return said.err if code == 2 or not said.out else said.out
+
+    return call
+
+
+class TestCommand:
+    def test_all_of_it(self, run, files, tmp_path):
         table, report = tmp_path / "t.csv", tmp_path / "r.html"
-        said = json.loads(self.run(
+        said = json.loads(run(
             files["aggressive"], "--driver", f"anna={files['smooth']}", "--vehicle", "bisoffi2017", "-o", table,
             "--report", report, "--box", "900:1900:country road", "--json",
         ))  # fmt: skip
@@ -577,8 +585,8 @@ class TestCommand:
         assert "country road" in charts
         assert all(label in charts for label in ("v, km/h", "p_r, %", "p_b, bar", "slope, %"))
 
-    def test_one_log_as_text_and_a_stretch(self, files):
-        said = self.run(files["smooth"], "--vehicle", "bisoffi2017", "--from", 200, "--to", 3000)
+    def test_one_log_as_text_and_a_stretch(self, run, files):
+        said = run(files["smooth"], "--vehicle", "bisoffi2017", "--from", 200, "--to", 3000)
         assert "smooth" in said
         assert "2.8" in said
 
@@ -588,7 +596,10 @@ class TestCommand:
             ((), "no log was given"),
             (("missing.blf",), "does not exist"),
             (("--driver", "anna"), "NAME=LOG"),
-            (("LOG", "--box", "5:1:x"), "FROM below TO"),
+            (("LOG", "--box", "5:1:x", "--report", "r.html"), "FROM below TO"),
+            (("LOG", "--box", "1:2", "--report", "r.html"), "FROM:TO:LABEL"),
+            (("LOG", "--box", "1:2"), "FROM:TO:LABEL"),
+            (("LOG", "--box", "1:2:ramp"), "--box without --report"),
             (("LOG", "-o", "t.mf4"), "styles"),
             (("LOG", "-o", "LOG"), "is an input"),
             (("LOG", "--report", "r.txt"), ".html"),
@@ -597,29 +608,111 @@ class TestCommand:
             (("LOG", "--from", "900", "--to", "100", "--vehicle", "bisoffi2017"), "stretch"),
         ],
     )
-    def test_misuse(self, words, said, files):
+    def test_misuse(self, run, words, said, files):
         words = [str(files["smooth"]) if word == "LOG" else word for word in words]
         before = files["smooth"].read_bytes()
-        assert said in self.run(*words, code=2)
+        assert said in run(*words, code=2)
         assert files["smooth"].read_bytes() == before
 
-    def test_a_log_that_cannot_feed(self, files):
-        assert "give --vehicle" in self.run(files["smooth"], code=1)
+    def test_a_log_that_cannot_feed(self, run, files):
+        assert "give --vehicle" in run(files["smooth"], code=1)
 
-    def test_own_reference(self, driven, files, tmp_path):
-        """Six logs make a scale; it rates the seventh; too few are refused and leave nothing."""
+    def test_own_reference(self, run, driven, files, tmp_path, monkeypatch):
+        """Six logs make a scale; it rates another; too few are refused and leave nothing; what is there is kept."""
         logs = []
-        for k, (entry, start) in enumerate((e, s) for e in driven.values() for s in (0.0, 130.0)):
-            if k < 6:
-                logs.append(write_log(tmp_path / f"d{k}.parquet", entry[3].between(start, start + 150)))
-        scale = tmp_path / "fleet.toml"
-        self.run(*logs, "--vehicle", "bisoffi2017", "--write-reference", scale)
-        said = json.loads(self.run(files["smooth"], "--vehicle", "bisoffi2017", "--reference", scale, "--json"))
+        for k, (entry, start) in enumerate((e, s) for e in driven.values() for s in (20.0, 80.0)):
+            if k < 7:
+                logs.append(write_log(tmp_path / f"d{k}.parquet", entry[3].between(start, start + 60)))
+        scale, table, car = tmp_path / "fleet.toml", tmp_path / "t.csv", ("--vehicle", "bisoffi2017")
+        run(*logs[:6], *car, "--write-reference", scale)
+        said = json.loads(run(files["smooth"], *car, "--reference", scale, "--json"))
         assert said["scale"] == "fleet"
         assert said["drivers"][0]["score"] is not None
-        none = tmp_path / "none.toml"
-        assert "6 at least" in self.run(*logs[:2], "--vehicle", "bisoffi2017", "--write-reference", none, code=2)
-        assert not none.exists()
+        before = scale.read_bytes()
+        assert "is there already" in run(*logs[:6], *car, "--write-reference", scale, code=2)
+        other = tmp_path / "other.toml"
+        other.write_text("kept = 1\n", encoding="utf-8")
+        assert "scale file" in run(*logs[:6], *car, "--write-reference", other, "--overwrite", code=2)
+        assert "6 at least" in run(*logs[:2], *car, "--write-reference", tmp_path / "n.toml", "-o", table, code=2)
+        assert not table.exists()
+        # The scale is the last to be written: where that fails, the table is not there either, and the old scale is.
+        with monkeypatch.context() as patch:
+            patch.setattr("codriver.drivers.scale_file.scale_text", lambda scale: 1 / 0)
+            run(*logs[:6], *car, "--write-reference", scale, "--overwrite", "-o", table, code=1)
+        assert scale.read_bytes() == before
+        assert not table.exists()
+        run(*logs[1:7], *car, "--write-reference", scale, "--overwrite", "-o", table)
+        assert scale.read_bytes() != before
+        assert sorted(p.name for p in tmp_path.iterdir() if p.suffix != ".parquet") == [
+            "fleet.toml",
+            "other.toml",
+            "t.csv",
+        ]
+
+
+# What a new user gets wrong, and a word of the finding.
+WRONG = {
+    "sign": ("longitudinal_acceleration", lambda x: -x, "sign is wrong"),
+    "g": ("longitudinal_acceleration", lambda x: x / 9.81, "looks like g read as"),
+    "per cent": ("accelerator_pedal", lambda x: 100 * x, "accelerator_pedal: .*outside"),
+    "km/h": ("longitudinal_speed", lambda x: 3.6 * x, "km/h read as m/s"),
+    "torque": ("engine_torque", lambda x: 2 * x, "M is too small, tau too large, or the torque"),
+    "gear": ("gear", lambda x: np.where(x > 0, x + 1, x), "gear numbers .* are shifted"),
+}
+
+
+class TestDataThatContradict:
+    def wrong(self, log: cd.Log, what: str) -> cd.Log:
+        name, change, _ = WRONG[what]
+        signal = log[name]
+        return log.with_signals(cd.Signal(name, signal.time, change(signal.values), signal.unit))
+
+    @pytest.mark.parametrize("what", WRONG)
+    def test_no_class_and_no_score(self, what, driven, run, tmp_path):
+        """Beside a sound driver: exit code 0. Alone: 1. Never a class, and the finding is said."""
+        log = driven["ordinary", 1][3].between(20.0, 260.0)
+        bad = write_log(tmp_path / "bad.parquet", self.wrong(log, what))
+        table, report = tmp_path / "t.csv", tmp_path / "r.html"
+        words = (bad, "--vehicle", "bisoffi2017", "-o", table, "--report", report)
+        said = json.loads(run(*words, "--json", code=1))
+        (row,) = said["drivers"]
+        assert (row["class"], row["score"], row["rank"]) == ("cannot tell", None, None)
+        assert "the data contradict" in row["why"]
+        worst = [f["text"] for f in said["findings"] if f["severity"] == "bad"]
+        assert re.search(WRONG[what][2], " ".join(worst)), worst
+        assert worst[0].startswith("bad: ")
+        assert worst[0][5:] in row["findings"]
+        assert "cannot tell" in table.read_text(encoding="utf-8")
+        assert "the data contradict" in report.read_text(encoding="utf-8")
+
+    def test_beside_a_sound_driver(self, driven, files, run, tmp_path):
+        """The sound one is rated as if alone; a scale of the two is refused."""
+        bad = write_log(tmp_path / "bad.parquet", self.wrong(driven["ordinary", 1][3], "sign"))
+        car = ("--vehicle", "bisoffi2017")
+        alone = json.loads(run(files["smooth"], *car, "--json"))["drivers"][0]
+        both = json.loads(run(bad, files["smooth"], *car, "--json"))["drivers"]
+        assert both[0]["class"] == "cannot tell"
+        assert (both[1]["class"], both[1]["score"], both[1]["rank"]) == (alone["class"], alone["score"], 1)
+        assert "no scale of these drivers: bad" in run(
+            bad, files["smooth"], *car, "--write-reference", tmp_path / "s.toml", code=1
+        )
+        assert not (tmp_path / "s.toml").exists()
+
+    def test_it_is_said_without_the_command(self, car, driven):
+        log = self.wrong(driven["ordinary", 1][3], "sign")
+        found = compare_drivers({"a": cd.estimate_log("intent-pedals", log, car)})
+        assert found.judged == ()
+        assert found.ratings[0].kind == "cannot tell"
+        assert found.ranking == ()
+        assert found.told[0].severity == "bad"
+        assert "sign is wrong" in found.told[0].text
+
+    @pytest.mark.parametrize(("p", "said"), [(0.6, "60 %"), (0.99, "99 %"), (0.996, "> 99 %"), (1.0, "> 99 %")])
+    def test_never_100_per_cent(self, p, said):
+        assert sure(p) == said
+
+    def test_no_class_is_said_to_be_certain(self, files, run):
+        assert "aggressive > 99 %" in run(files["aggressive"], "--vehicle", "bisoffi2017")
 
 
 def test_table_as_parquet_holds_what_the_comparison_says(triplet, tmp_path):

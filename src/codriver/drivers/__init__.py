@@ -7,6 +7,7 @@ course, position, alignment    the curvilinear coordinate, several drives on it
 slopes                         whether drivers of one road find the same slope
 style                          one driver in numbers
 scale, population, scale_file  score and class; scales of a population; scales as files
+doubts                         whether the data allow a judgement
 compare                        several drivers
 style_file                     the table of drivers as Parquet or CSV
 """

@@ -11,20 +11,23 @@ the intervals are wider than they need be.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from codriver.drivers.alignment import Along, How, align, along
 from codriver.drivers.course import Course
+from codriver.drivers.doubts import contradicted, doubts_of, refusal
 from codriver.drivers.scale import Rating, Scale, rate_style, score_draws
 from codriver.drivers.scale_file import default_scale
 from codriver.drivers.slopes import Agreement, slope_agreement
 from codriver.drivers.style import DriverStyle, common_threshold, describe_style, refuse_mixed
+from codriver.drivers.threshold import Threshold
 from codriver.errors import CodriverError, UsageError
 from codriver.estimate import Estimate
 from codriver.finding import Finding
 from codriver.signals.signal import Array
+from codriver.trust import Check
 
 # Least correlation of the slopes of one road. Of one simulated road 0.95 at least, of two 0.77 at most (docs/styles.md).
 SAME_ROAD = 0.9
@@ -47,7 +50,7 @@ class Comparison:
 
     Attributes:
         styles: in the order given.
-        ratings: of each; None where the scale does not fit.
+        ratings: of each; None where the scale does not fit. "cannot tell" without a score where the data contradict.
         ranking: the most aggressive first; those without a score are left out.
         scale: what rates them; None where none fits.
         aligned: "start", "ends" or "position"; "" where there is no curvilinear coordinate.
@@ -55,6 +58,7 @@ class Comparison:
         along: signals over s; None without a coordinate.
         agreement: of the slopes; None without a coordinate or slopes.
         findings: what to know before believing it.
+        doubts: what the checks found against the data of each driver, by name (`doubts.py`).
     """
 
     styles: tuple[DriverStyle, ...]
@@ -66,6 +70,18 @@ class Comparison:
     along: Along | None = field(repr=False)
     agreement: Agreement | None
     findings: tuple[Finding, ...]
+    doubts: Mapping[str, tuple[Finding, ...]]
+
+    @property
+    def told(self) -> tuple[Finding, ...]:
+        """Findings of the comparison and doubts of the drivers, each with its name, the worst first."""
+        every = [replace(f, text=f"{name}: {f.text}") for name, mine in self.doubts.items() for f in mine]
+        return tuple(sorted([*every, *self.findings], key=lambda f: ("bad", "warn", "ok").index(f.severity)))
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """Drivers whose data nothing bad was found against."""
+        return tuple(name for name, mine in self.doubts.items() if not contradicted(mine))
 
 
 def compare_drivers(
@@ -76,8 +92,11 @@ def compare_drivers(
     stop: float | None = None,
     how: How = "auto",
     true_slope: Array | None = None,
+    checks: Mapping[str, Sequence[Check]] | None = None,
 ) -> Comparison:
     """Compare drivers.
+
+    A driver whose data contradict themselves gets no score and no class, and sets no threshold for the others.
 
     Args:
         drivers: estimates by name, all of one estimator with one ell and noise. Of several logs of a driver the first
@@ -86,6 +105,7 @@ def compare_drivers(
         start, stop: only this stretch of road, m.
         how: drives are aligned; see `alignment.py`.
         true_slope: per cent at the places of `along`, where a simulation knows it.
+        checks: verdicts on the estimates, by name and in their order; None takes what each says of itself (`check()`).
 
     Raises:
         UsageError: no drivers; estimates that do not compare; a scale that does not fit; a stretch that is none.
@@ -100,7 +120,9 @@ def compare_drivers(
     courses, aligned = _courses(every, how, start is not None or stop is not None, findings)
     of_run = iter(courses)
     placed = {name: [next(of_run) for _ in mine] for name, mine in runs.items()} if courses else {}
-    limits = common_threshold(every)
+    doubts = [doubts_of(m, [e.check() for e in m] if checks is None else checks[n]) for n, m in runs.items()]
+    sound = [run for mine, d in zip(runs.values(), doubts, strict=True) if not contradicted(d) for run in mine]
+    limits = common_threshold(sound or every)
     styles = tuple(
         describe_style(
             mine, name, start=start, stop=stop, threshold=limits,
@@ -108,21 +130,20 @@ def compare_drivers(
         )
         for name, mine in runs.items()
     )  # fmt: skip
-    if limits.noisy:
-        findings.append(Finding("warn", (
-            f"the noise of a log sets the threshold of bursts ({limits.on:.2f} m/s^3): their counts compare within "
-            "this comparison only"
-        )))  # fmt: skip
+    findings += _noisy(limits)
     scale = scale or _fitting(styles[0], findings)
-    ratings = tuple(None if scale is None else rate_style(style, scale) for style in styles)
+    ratings = tuple(
+        refusal(d) or (None if scale is None else rate_style(s, scale)) for s, d in zip(styles, doubts, strict=True)
+    )
     chosen = {name: mine[0] for name, mine in placed.items()}
     signals = along({n: mine[0] for n, mine in runs.items()}, chosen, start, stop) if chosen else None
     agreement = _agreement(signals, true_slope)
     if len(runs) > 1:
         findings += _same_road(agreement, chosen, styles)
     return Comparison(
-        styles, ratings, _ranking(styles, ratings, scale), scale, aligned, chosen, signals, agreement, tuple(findings)
-    )
+        styles, ratings, _ranking(styles, ratings, scale), scale, aligned, chosen, signals, agreement, tuple(findings),
+        {style.name: d for style, d in zip(styles, doubts, strict=True)},
+    )  # fmt: skip
 
 
 def _courses(runs: list[Estimate], how: How, needed: bool, findings: list[Finding]) -> tuple[list[Course], str]:
@@ -139,6 +160,16 @@ def _courses(runs: list[Estimate], how: How, needed: bool, findings: list[Findin
             return [], ""
         findings.append(Finding("warn", f"{error.found}; drives are aligned by their start instead"))
         return courses, aligned
+
+
+def _noisy(limits: Threshold) -> list[Finding]:
+    """Whether noise, and not the estimator, says what a burst is."""
+    if not limits.noisy:
+        return []
+    return [Finding("warn", (
+        f"the noise of a log sets the threshold of bursts ({limits.on:.2f} m/s^3): their counts compare within "
+        "this comparison only"
+    ))]  # fmt: skip
 
 
 def _fitting(style: DriverStyle, findings: list[Finding]) -> Scale | None:

@@ -90,7 +90,7 @@ class Rating:
         sd: standard deviation of the score on any road.
         low, high: 95 % interval of the score, of this drive alone (block bootstrap); None with too few blocks.
         kind: the class, or "cannot tell".
-        probability: of each class; empty without a score.
+        probability: of each class; empty without a score. In words never 100 %, see `sure`.
         why: reasons for "cannot tell", and what weakens the class.
     """
 
@@ -164,12 +164,17 @@ def rate_style(style: DriverStyle, scale: Scale) -> Rating:
     likely = max(probability, key=lambda kind: probability[kind])
     enough = not why
     if enough and probability[likely] < SURE:
-        why.append(f"no class is likely enough: {likely} has {probability[likely]:.0%}")
+        why.append(f"no class is likely enough: {likely} has {sure(probability[likely])}")
         enough = False
     if not pedal:
         why.append("without the accelerator pedal, restlessness is not seen and classes are less certain")
     kind: Class = next((c for c in ("smooth", "intermediate", "aggressive") if c == likely), "cannot tell")
     return Rating(score, sd, low, high, kind if enough else "cannot tell", probability, tuple(why))
+
+
+def sure(probability: float) -> str:
+    """A probability as people read it; never 100 %, for the tails of the normal law are the least known."""
+    return "> 99 %" if probability > 0.99 else f"{100 * probability:.0f} %"
 
 
 def score_draws(style: DriverStyle, scale: Scale, seed: int = 0) -> Array:

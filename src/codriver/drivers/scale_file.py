@@ -53,8 +53,12 @@ def load_scale(path: str | Path) -> Scale:
     return parse_scale(read_text(path, "scale file", UsageError), str(path))
 
 
-def check_scale_name(path: str | Path) -> Path:
+def check_scale_name(path: str | Path, *, overwrite: bool = False) -> Path:
     """Whether a scale can be written here, asked before long work.
+
+    Args:
+        path: to write to.
+        overwrite: whether a scale that is there may be replaced; anything else never.
 
     Raises:
         UsageError: the name does not end in .toml, the folder does not exist, or something is there already.
@@ -63,20 +67,24 @@ def check_scale_name(path: str | Path) -> Path:
     if path.suffix != ".toml":
         raise UsageError(f"cannot write a scale to '{path.name}'", "a name ending in .toml", "choose such a name")
     if path.exists():
-        raise UsageError(f"{path} is there already", "the name of a new file", "choose another name, or remove it")
+        if not overwrite:
+            raise UsageError(
+                f"{path} is there already", "the name of a new file", "choose another name, or say --overwrite"
+            )
+        load_scale(path)
     if not path.parent.is_dir():
         raise UsageError(f"the folder {path.parent} does not exist", "an existing folder", "create it first")
     return path
 
 
-def save_scale(scale: Scale, path: str | Path) -> Path:
-    """Write a scale file that `load_scale` reads, whole or not at all; a file that is there is not replaced.
+def save_scale(scale: Scale, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a scale file that `load_scale` reads, whole or not at all; what is there is replaced only with `overwrite`.
 
     Raises:
         UsageError: see `check_scale_name`.
         LogError: it cannot be written.
     """
-    path = check_scale_name(path)
+    path = check_scale_name(path, overwrite=overwrite)
     with complete_or_nothing(path) as draft:
         draft.write_text(scale_text(scale), encoding="utf-8", newline="\n")
     return path

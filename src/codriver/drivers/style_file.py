@@ -41,6 +41,7 @@ def rows_of(comparison: Comparison) -> list[dict[str, Any]]:
             "driver": style.name,
             "logs": "; ".join(style.sources),
             **_rated(rating),
+            "findings": "; ".join(f"{f.severity}: {f.text}" for f in comparison.doubts[style.name]),
             "rank": rank.rank if rank else None,
             "rank_low": rank.low if rank else None,
             "rank_high": rank.high if rank else None,

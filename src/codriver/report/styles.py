@@ -13,7 +13,7 @@ import numpy as np
 from codriver.drivers.alignment import Along
 from codriver.drivers.compare import Comparison
 from codriver.drivers.resampling import Interval
-from codriver.drivers.scale import Rating
+from codriver.drivers.scale import Rating, sure
 from codriver.drivers.style import DriverStyle
 from codriver.report.document import COLORS, Chart, Curve, Document, Findings, Mark, Part, Plot, Section, Table
 
@@ -78,7 +78,7 @@ def _drivers(comparison: Comparison) -> tuple[Part, ...]:
     parts: list[Part] = [Table(head, tuple(rows), caption)]
     if comparison.scale is not None:
         parts.append(f"Scale: {comparison.scale.name}; {comparison.scale.source}.")
-    told = [(f.severity, f.text) for f in comparison.findings]
+    told = [(f.severity, f.text) for f in comparison.told]
     for style, rating in zip(comparison.styles, comparison.ratings, strict=True):
         told += [("warn", f"{style.name}: {why}") for why in (rating.why if rating else ())]
     if told:
@@ -197,7 +197,7 @@ def _kind(rating: Rating | None) -> str | Mark:
         return "no scale"
     if rating.kind == "cannot tell":
         return Mark("open", "cannot tell")
-    return f"{rating.kind}, {rating.probability[rating.kind]:.0%}"
+    return f"{rating.kind}, {sure(rating.probability[rating.kind])}"
 
 
 def _score(rating: Rating | None) -> str | None:
