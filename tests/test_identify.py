@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 import time
 from pathlib import Path
@@ -461,8 +462,9 @@ class TestRefusals:
         assert found.curve == ()
 
     def test_one_speed(self, car):
-        """Constant speed on a wavy road, never braking: nothing tells drag from rolling resistance."""
-        log = synthetic(200, varied=False, brakes=False)
+        """One speed on a wavy road, never braking: nothing tells drag from rolling resistance."""
+        wheels = np.random.default_rng(0).choice([-0.001, 0.0, 0.001], 20_000)
+        log = changed(synthetic(200, varied=False, brakes=False), "longitudinal_speed", lambda v: v + wheels)
         with pytest.raises(LogError) as error:
             identify_brake(log, car)
         for name in ("c_b", "kappa_1", "kappa_2"):
@@ -492,7 +494,7 @@ class TestRefusals:
                 assert abs(found["c_b"].value - C_B) < 5 * found["c_b"].sd
 
     def test_standing(self, car):
-        log = changed(synthetic(60), "longitudinal_speed", lambda v: 0 * v)
+        log = changed(synthetic(60, varied=False, noise=0.01), "longitudinal_speed", lambda v: 0 * v)
         with pytest.raises(LogError, match="standing or slower"):
             identify_brake(log, car)
 
@@ -532,6 +534,80 @@ def pedal_log(work, seconds: float = 200.0, noise: float = 0.3, reach: float = 0
         np.arange(n) * 0.01,
         {"accelerator_pedal": pedal, "engine_torque_request": work(pedal) + noise * rng.standard_normal(n)},
     )
+
+
+def g_units(y):
+    return y / 9.80665
+
+
+class TestUnsound:
+    """What least squares would not show: told by name before anything is fitted."""
+
+    @pytest.mark.parametrize(
+        ("name", "work", "words"),
+        [
+            ("longitudinal_acceleration", g_units, "the accelerometer looks like g read as m/s^2"),
+            ("longitudinal_acceleration", lambda y: -y, "sign is wrong"),
+            ("longitudinal_acceleration", lambda y: np.random.default_rng(0).standard_normal(y.size), "hardly go together"),
+            ("longitudinal_acceleration", lambda y: 0 * y, "longitudinal_acceleration is 0 m/s^2 all the time"),
+            ("longitudinal_speed", lambda v: 0 * v + 20, "longitudinal_speed is 20 m/s all the time"),
+            ("longitudinal_speed", lambda v: 3.6 * v, "km/h read as m/s"),
+            ("engine_torque", lambda x: 0 * x + 80, "engine_torque is 80 N*m all the time"),
+        ],
+        ids=["g", "sign", "noise", "flat", "stuck", "km/h", "torque"],
+    )  # fmt: skip
+    def test_refused_by_brake_and_ratio(self, demo, car, name, work, words):
+        spoilt = changed(demo.measured, name, work)
+        for identify in (lambda: identify_brake(spoilt, car), lambda: identify_ratio(spoilt)):
+            with pytest.raises(LogError, match=re.escape(words)):
+                identify()
+
+    def test_pressure_stuck_or_in_bar(self, demo, car):
+        with pytest.raises(LogError, match="brake_pressure is 5e"):
+            identify_brake(changed(demo.measured, "brake_pressure", lambda p: 0 * p + 5e5), car)
+        with pytest.raises(LogError, match="is its unit right"):
+            identify_brake(changed(demo.measured, "brake_pressure", lambda p: 1e-5 * p), car)
+
+    def test_slow_samples(self, demo, car):
+        slow = demo.measured.with_signals(*(
+            cd.Signal(name, s.time[:: round(s.rate)], s.values[:: round(s.rate)], s.unit)
+            for name in UNITS if name != "gear" for s in [demo.measured[name]]
+        ))  # fmt: skip
+        for identify in (lambda: identify_brake(slow, car), lambda: identify_ratio(slow), lambda: identify_pedal(slow)):
+            with pytest.raises(LogError, match="comes 1 times a second"):
+                identify()
+
+    def test_two_rows(self, car):
+        log = synthetic(20).between(3.0, 3.015)
+        with pytest.raises(LogError, match="has 2 samples over 0.01 s"):
+            identify_brake(log, car)
+
+
+class TestSaturation:
+    def test_pressure_cut_off(self, road, car):
+        """At 10 bar: c_b would be 265 N/bar; the moments at the end are left out, and that is told."""
+        cut = changed(road, "brake_pressure", lambda p: np.minimum(p, 10e5))
+        found = identify_brake(cut, car)
+        assert found.coefficients["c_b"].value == pytest.approx(C_B, rel=0.005)
+        assert found.trimmed < 0.01
+        assert any("brake_pressure stays at 10 bar" in f.text for f in found.rows.clipped)
+
+    @pytest.mark.parametrize(("name", "end"), [("engine_torque", 150.0), ("longitudinal_acceleration", 1.2)])
+    def test_torque_and_accelerometer_cut_off(self, road, car, name, end):
+        found = identify_brake(changed(road, name, lambda x: np.minimum(x, end)), car)
+        assert found.coefficients["c_b"].value == pytest.approx(C_B, rel=0.01)
+        assert any(f"{name} stays at {end:.4g}" in f.text for f in found.rows.clipped)
+
+    def test_honest_signals_have_no_plateau(self, fit):
+        assert fit.rows.clipped == ()
+
+    def test_a_wrong_file_is_not_called_right(self, road, car):
+        part = road.between(0, 900)
+        cut = changed(part, "brake_pressure", lambda p: np.minimum(p, 10e5))
+        wrong = car.with_parameter("brake_coefficient", 265e-5, source="of clipped pressure")
+        said = {f.severity: f.text for f in check_vehicle_against_log(cut, wrong)}
+        assert "c_b or the unit" in said["bad"]
+        assert all(f.severity == "ok" for f in check_vehicle_against_log(part, car))
 
 
 class TestPedal:
@@ -610,7 +686,7 @@ class TestRatio:
 
     def test_steady_torque(self):
         log = changed(synthetic(60), "engine_torque", lambda x: 0 * x + 80)
-        with pytest.raises(LogError, match="torque varies by"):
+        with pytest.raises(LogError, match="engine_torque is 80"):
             identify_ratio(log)
 
 

@@ -21,9 +21,11 @@ import numpy as np
 
 from codriver.errors import LogError
 from codriver.identify.brake_fit import PARAMETERS, BrakeFit, Coefficient, Refusal
-from codriver.identify.brake_rows import DriveRows, drive_rows, halves, short_name
+from codriver.identify.brake_rows import SIGNALS, DriveRows, drive_rows, halves, short_name
 from codriver.identify.learning import learning_curve
+from codriver.identify.plausible import check_bias
 from codriver.identify.regression import Regression, regress, rms, solve
+from codriver.identify.sound import refuse_unsound
 from codriver.identify.standard_errors import autocorrelation
 from codriver.signals import Log
 from codriver.signals.grid import Flags
@@ -65,6 +67,8 @@ def identify_brake(
     """
     logs = [logs] if isinstance(logs, Log) else list(logs)
     M, taus = vehicle.number("mass"), vehicle.numbers("transmission")
+    check_bias(bias)
+    refuse_unsound(logs, SIGNALS)
     rows = drive_rows(logs, len(taus), dt, known_gears=True)
     first, second = halves(rows.keep, rows.pieces)
     _enough(first, rows, logs)

@@ -20,7 +20,9 @@ from itertools import pairwise
 import numpy as np
 
 from codriver.errors import MissingSignal
+from codriver.finding import Finding
 from codriver.identify.low_pass import centred, low_pass, rate
+from codriver.identify.saturation import told
 from codriver.identify.standard_errors import Index
 from codriver.identify.usable import BRAKING, filled, inside, usable
 from codriver.signals import Log
@@ -45,6 +47,7 @@ class DriveRows:
         share: of the ticks that were left out, by reason.
         pressed: ticks with the brake pressed.
         shifting: ticks around gear shifts.
+        clipped: what is to say about sensors at the end of their range.
     """
 
     dt: float
@@ -60,6 +63,7 @@ class DriveRows:
     share: Mapping[str, float]
     pressed: Flags
     shifting: Flags
+    clipped: tuple[Finding, ...]
 
     @property
     def log_of(self) -> Index:
@@ -100,7 +104,8 @@ def drive_rows(
         reason: sum(part.share[reason] * size for part, size in zip(parts, sizes, strict=True)) / total
         for reason in parts[0].share
     }
-    return DriveRows(dt, np.concatenate([[0], np.cumsum(sizes)]), share=share, **joined)
+    clipped = tuple(finding for part in parts for finding in part.clipped)
+    return DriveRows(dt, np.concatenate([[0], np.cumsum(sizes)]), share=share, clipped=clipped, **joined)
 
 
 def _one(log: Log, gears: int, dt: float, known_gears: bool, pressure: bool, without_braking: bool) -> DriveRows:
@@ -129,6 +134,7 @@ def _one(log: Log, gears: int, dt: float, known_gears: bool, pressure: bool, wit
     return DriveRows(
         dt, np.array([0, len(grid)]), grid.time, filtered[:, 0], filtered[:, 3:], filtered[:, 1], filtered[:, 2],
         rate(v, dt), gear, judged.keep, judged.share, switch | (values["brake_pressure"] > BRAKING), judged.left_out["shift"],
+        tuple(told(judged.plateaus, short_name(log))),
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from codriver.finding import Finding
 from codriver.identify.brake_rows import halves, short_name
 from codriver.identify.low_pass import centred, low_pass, rate
 from codriver.identify.regression import regress, rms, solve
+from codriver.identify.sound import refuse_unsound
 from codriver.identify.usable import AFTER_SHIFT, BEFORE_SHIFT, OPEN_CLUTCH, filled, inside, widened
 from codriver.signals import Grid, Log
 from codriver.signals.grid import Flags
@@ -118,6 +119,7 @@ def identify_pedal(
         LogError: too little pedal, or a request that is no multiple of the pedal; the message says which.
     """
     logs = [logs] if isinstance(logs, Log) else list(logs)
+    refuse_unsound(logs, SIGNALS)
     parts = [pedal_rows(log, dt) for log in logs]
     pedal, request = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
     keep = np.concatenate([part[2] for part in parts])

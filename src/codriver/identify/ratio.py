@@ -25,8 +25,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from codriver.errors import LogError, UsageError
-from codriver.identify.brake_rows import DriveRows, drive_rows, short_name
+from codriver.identify.brake_rows import SIGNALS, DriveRows, drive_rows, short_name
 from codriver.identify.regression import Regression, regress, rms, solve
+from codriver.identify.sound import refuse_unsound
 from codriver.signals import Log
 from codriver.signals.signal import Array
 
@@ -162,6 +163,7 @@ def identify_ratio(logs: Log | Sequence[Log], *, dt: float = 0.01, seed: int = 0
         LogError: the drives do not excite the ratio of any gear: too short, or the torque hardly changes.
     """
     logs = [logs] if isinstance(logs, Log) else list(logs)
+    refuse_unsound(logs, SIGNALS[:-1])
     highest = max((float(np.nanmax(log["gear"].values, initial=1)) for log in logs if "gear" in log), default=1.0)
     count = int(min(max(highest, 1), MOST_GEARS))
     rows = drive_rows(logs, count, dt, known_gears=True, pressure=False, without_braking=True)

@@ -5,7 +5,7 @@ signals there. Each reason to leave a moment out comes with margins: the low-pas
 for up to a second after a shift.
 
     missing    a signal is older than its hold time, or not there yet
-    absurd     a value that no vehicle can show (bounds of the vocabulary), or a sensor at the end of its range
+    absurd     a value that no vehicle can show (bounds of the vocabulary), or a sensor that stays at the end of its range
     shift      from 0.2 s before the clutch opens or the gear changes until 1 s after it closed; neutral
     slow       below 2 m/s, and half a second around it
     reverse    reverse gear or negative speed
@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from codriver.identify.low_pass import low_pass, rate, smooth
+from codriver.identify.saturation import AT_END, Plateau, plateaus
 from codriver.names import VOCABULARY
 from codriver.signals import Grid
 from codriver.signals.grid import Flags
@@ -34,7 +35,6 @@ AROUND_SLOW = 0.5  # s
 AFTER_BRAKING = 1.0  # s left out around braking: pressure and regeneration fade
 OPEN_CLUTCH = 0.05
 SLIP, SLIP_MARGIN, USUAL = 1.5, 0.5, 10.0  # m/s^2; s; s over which slope and bias stay alike
-AT_END, LEAST_END = 0.3, {"longitudinal_acceleration": 3.0, "brake_pressure": 2e6}  # s; m/s^2, Pa
 BRAKING = 0.7e5  # Pa
 REASONS: Mapping[str, str] = {
     "missing": "a signal missing or too old",
@@ -55,10 +55,12 @@ class Usable:
     Attributes:
         keep: shape (n,).
         left_out: by reason, shape (n,); one tick can have several reasons.
+        plateaus: ends of a sensor's range at which it stayed.
     """
 
     keep: Flags
     left_out: Mapping[str, Flags]
+    plateaus: tuple[Plateau, ...] = ()
 
     @property
     def share(self) -> dict[str, float]:
@@ -76,7 +78,13 @@ def usable(grid: Grid, needed: tuple[str, ...], known_gears: int | None, *, with
         without_braking: leave braking out.
     """
     dt, n = grid.dt, len(grid)
-    left_out = {"missing": ~np.all([grid.held[name] for name in needed], axis=0), "absurd": _absurd(grid, needed)}
+    left_out = {"missing": ~np.all([grid.held[name] for name in needed], axis=0), "absurd": np.zeros(n, bool)}
+    ends: list[Plateau] = []
+    for name in needed:
+        x, good = grid.values[name], inside(name, grid.values[name])
+        at_end, found = plateaus(name, x, good, dt)
+        left_out["absurd"] |= (np.isfinite(x) & ~good) | widened(at_end, AT_END, AT_END, dt)
+        ends += found
     bad = left_out["missing"] | left_out["absurd"]
     speed = np.where(bad, 0.0, np.nan_to_num(grid.values["longitudinal_speed"]))
     gear = grid.values["gear"] if grid.held["gear"].any() else np.ones(n)
@@ -98,7 +106,7 @@ def usable(grid: Grid, needed: tuple[str, ...], known_gears: int | None, *, with
         widened(left_out[reason], 0.0, 0.2, dt) for reason in ("missing", "absurd")
     )
     keep = ~np.any(list(left_out.values()), axis=0)
-    return Usable(keep, left_out)
+    return Usable(keep, left_out, tuple(ends))
 
 
 def widened(mask: Flags, before: float, after: float, dt: float) -> Flags:
@@ -124,25 +132,6 @@ def inside(name: str, x: Array) -> Flags:
     entry = VOCABULARY[name]
     with np.errstate(invalid="ignore"):
         return np.asarray((x >= entry.low) & (x <= entry.high))
-
-
-def _absurd(grid: Grid, needed: tuple[str, ...]) -> Flags:
-    """Values out of the vocabulary's bounds, and a sensor that stays at its greatest or least value."""
-    mask = np.zeros(len(grid), bool)
-    ticks = max(round(AT_END / grid.dt), 2)
-    for name in needed:
-        x = grid.values[name]
-        there = np.isfinite(x)
-        good = inside(name, x)
-        mask |= there & ~good
-        if name in LEAST_END and good.any():
-            for end in (float(x[good].max()), float(x[good].min())):
-                if abs(end) >= LEAST_END[name]:
-                    at = np.concatenate([[0], np.cumsum(x == end)])
-                    run = np.zeros(len(grid), bool)
-                    run[: max(len(grid) - ticks + 1, 0)] = at[ticks:] - at[:-ticks] == ticks
-                    mask |= widened(run, 0.0, AT_END, grid.dt)
-    return mask
 
 
 def _slip(grid: Grid, bad: Flags) -> Flags:
