@@ -696,22 +696,23 @@ class TestTorqueScale:
             identify_torque_scale(np.array(command), np.array(mass))
 
 
-class TestCommands:
-    @pytest.fixture(scope="class")
-    def folder(self, real, tmp_path_factory):
-        folder = tmp_path_factory.mktemp("wheel")
-        angle, torque = real["steering_wheel_angle"], real["steering_motor_torque"]
-        rows = [
-            f"{t:.2f},{a / DEGREE:.1f},{u:.5f}" for t, a, u in zip(angle.time, angle.values, torque.values, strict=True)
-        ]
-        head = "time [s],steering_wheel_angle [deg],steering_motor_torque [N*m]"
-        (folder / "chirp.csv").write_text("\n".join([head, *rows]) + "\n")
-        (folder / "still.csv").write_text(
-            "\n".join([head, *(f"{t:.2f},1.0,{u:.5f}" for t, u in zip(TIME, CHIRP, strict=True))])
-        )
-        (folder / "weights.csv").write_text("command,mass\n-1.58,-2\n-0.85,-1\n0.25,0.5\n0.61,1\n1.36,2\n")
-        return folder
+@pytest.fixture(scope="module")
+def folder(real, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
+    angle, torque = real["steering_wheel_angle"], real["steering_motor_torque"]
+    rows = [
+        f"{t:.2f},{a / DEGREE:.1f},{u:.5f}" for t, a, u in zip(angle.time, angle.values, torque.values, strict=True)
+    ]
+    head = "time [s],steering_wheel_angle [deg],steering_motor_torque [N*m]"
+    (folder / "chirp.csv").write_text("\n".join([head, *rows]) + "\n")
+    (folder / "still.csv").write_text(
+        "\n".join([head, *(f"{t:.2f},1.0,{u:.5f}" for t, u in zip(TIME, CHIRP, strict=True))])
+    )
+    (folder / "weights.csv").write_text("command,mass\n-1.58,-2\n-0.85,-1\n0.25,0.5\n0.61,1\n1.36,2\n")
+    return folder
 
+
+class TestCommands:
     def run(self, *arguments):
         from typer.testing import CliRunner
 
