@@ -11,7 +11,7 @@ import codriver as cd
 from codriver.errors import NamesError
 from codriver.live import BusDecoder
 from codriver.logs.clock import mend_clock
-from codriver.logs.mend import drop_codes
+from codriver.logs.mend import drop_codes, find_faults
 from codriver.logs.names_file import parse_names
 from codriver.logs.wording import counted
 
@@ -347,6 +347,17 @@ def test_a_leap_of_the_clock_does_not_fill_the_memory():
     kept, values, notes = mend_clock(days, np.arange(6000.0))
     assert values.tolist() == list(range(4000))
     assert "left out" in notes[0]
+
+
+def test_single_samples_of_a_speed_that_leap():
+    """One wrong sample is told with its size and place; braking hard, a quantised speed and a slow GPS are not."""
+    t = np.arange(3000) / 100
+    v = 20 - 12 * np.clip(t - 10, 0, 1.5)
+    for values, time in ((v, t), (np.round(v / 0.4) * 0.4, t), (v[::100], t[::100])):
+        assert find_faults(cd.Signal("longitudinal_speed", time, values, "m/s")) == []
+    v[2000] += 5
+    told = find_faults(cd.Signal("longitudinal_speed", t, v, "m/s"))
+    assert "1 single sample stands out from the neighbours, by up to 5 m/s at 20.00 s" in told[0]
 
 
 def test_absurd_values_are_missing():

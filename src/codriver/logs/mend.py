@@ -21,6 +21,8 @@ OTHER_CLOCK = 3600.0
 LATE = 2.0  # s
 ABSURD = 10.0  # times the largest value that the quantity can plausibly have
 REST_PRESSURE = 0.3e5  # Pa
+# A speed that differs more than this from the samples before and after it, to the same side, is a wrong sample: m/s^2, m/s.
+LEAPING, GRAIN = 30.0, 0.5
 _ANALOGUE = {"longitudinal_acceleration", "lateral_acceleration", "yaw_rate", "roll_rate", "pitch_rate"}
 
 
@@ -143,6 +145,8 @@ def find_faults(signal: Signal) -> list[str]:
         if longest.max() > STUCK_SECONDS:
             where = float(edges[np.argmax(longest)])
             sentences.append(f"{name}: shows one value for {longest.max():.3g} s from {where:.2f} s on; stuck sensor?")
+    if signal.name == "longitudinal_speed":
+        sentences += _leaping(signal)
     finite = signal.values[np.isfinite(signal.values)]
     if (
         signal.name == "brake_pressure"
@@ -154,3 +158,20 @@ def find_faults(signal: Signal) -> list[str]:
             "rest value, subtract it: offset in the names file, in the source's unit"
         )
     return sentences
+
+
+def _leaping(signal: Signal) -> list[str]:
+    """A sentence if single samples of a speed stand out from both neighbours by more than any vehicle changes it."""
+    there = np.isfinite(signal.values)
+    time, values = signal.time[there], signal.values[there]
+    steps, allowed = np.diff(values), LEAPING * np.diff(time) + GRAIN
+    single = (np.abs(steps[:-1]) > allowed[:-1]) & (np.abs(steps[1:]) > allowed[1:]) & (steps[:-1] * steps[1:] < 0)
+    count = int(single.sum())
+    if not count:
+        return []
+    worst = int(np.argmax(np.where(single, np.abs(steps[:-1]), 0.0)))
+    return [
+        f"{_named(signal)}: {counted(count, 'single sample', 'stands', 'stand')} out from the neighbours, by up to "
+        f"{abs(steps[worst]):.3g} m/s at {time[worst + 1]:.2f} s, as no vehicle does; used as they are: take them out of the "
+        "recording before (docs/trust.md shows how)"
+    ]
