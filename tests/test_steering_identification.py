@@ -28,6 +28,7 @@ from codriver.simulate.steering import (
     chirp,
     simulate_wheel,
 )
+from conftest import recording
 
 J, B = 0.0672, 0.3562  # eq. (82)
 HALF = (0.5 * J, 0.5 * B)
@@ -356,7 +357,7 @@ def rows_of(runs: WheelRuns, run: int = 0, form: str = "exact") -> Rows:
     return Rows(0.01, runs.time, runs.torque, runs.measured[run], np.ones(n, bool), np.zeros(n, bool), form)
 
 
-TIME = np.arange(3001) * 0.01
+TIME = np.arange(1501) * 0.01
 CHIRP = chirp(TIME, low=0.3, high=4.0)
 REAL = WheelSetting(
     Wheel(friction=0.5), WheelNoise(resolution=0.1 * DEGREE), "exact", (0.0, 0.0)
@@ -465,6 +466,7 @@ class TestFit:
         assert 0.9 < np.mean(nis) < 1.1
         assert np.mean([0.9 < fit.run.nis < 1.1 for fit in fits]) == 1
 
+    @pytest.mark.slow
     def test_friction(self):
         """Left out it makes b_s far too large; in the model all three are right, within standard errors and half a per cent.
 
@@ -557,11 +559,12 @@ class TestRecording:
         fit = identify_steering_wheel(cd.read(path), filters=False)
         assert is_right(fit)
 
+    @pytest.mark.slow
     def test_encoder_jumps_and_spikes(self, real):
         values = real["steering_wheel_angle"].values.copy()
-        values[1000:] += 0.3
-        values[2000:] -= 0.05
-        values[500] += 1.0
+        values[600:] += 0.3
+        values[1000:] -= 0.05
+        values[300] += 1.0
         fit = identify_steering_wheel(with_angle(real, values), filters=False)
         assert is_right(fit)
         told = " ".join(f.text for f in fit.findings)
@@ -577,6 +580,7 @@ class TestRecording:
         assert jumps.size == 0
         assert "wraps" in findings[0].text
 
+    @pytest.mark.slow
     def test_end_stops(self):
         setting = replace(REAL, wheel=Wheel(friction=0.5, end_stop=1.0))
         fit = identify_steering_wheel(simulate_wheel(3 * CHIRP, setting).log(), filters=False)
@@ -591,6 +595,7 @@ class TestRecording:
         assert is_right(fit)
         assert fit.left_out > 0.2
 
+    @pytest.mark.slow
     def test_saturated_angle(self, real):
         values = np.clip(real["steering_wheel_angle"].values, -0.5, 2.0)
         fit = identify_steering_wheel(with_angle(real, values), filters=False)
@@ -611,6 +616,7 @@ class TestRecording:
         assert fit.coefficients["T_0"].value == pytest.approx(0.2, abs=0.01)
         assert is_right(fit)
 
+    @pytest.mark.slow
     def test_wrong_sign_is_refused(self, real):
         fit = identify_steering_wheel(with_torque(real, -CHIRP), filters=False)
         assert not fit.coefficients
@@ -618,7 +624,7 @@ class TestRecording:
             fit.vehicle()
 
     def test_hands_on_the_wheel(self):
-        hands = np.convolve(np.random.default_rng(1).standard_normal(3001), np.ones(60) / 60, "same") * 8
+        hands = np.convolve(np.random.default_rng(1).standard_normal(TIME.size), np.ones(60) / 60, "same") * 8
         log = simulate_wheel(CHIRP + hands, REAL).log()
         fit = identify_steering_wheel(with_torque(log, CHIRP), filters=False)
         assert not fit.coefficients
@@ -627,12 +633,15 @@ class TestRecording:
     def test_slow_record_does_not_tell_the_inertia(self):
         """0.1 N m at 0.1 rad/s: b_s is told, J_s is refused with its share of the torque."""
         setting = replace(REAL, wheel=Wheel(), noise=WheelNoise())
-        fit = identify_steering_wheel(simulate_wheel(0.1 * np.sin(0.1 * TIME), setting).log(), filters=False)
+        fit = identify_steering_wheel(
+            simulate_wheel(0.1 * np.sin(0.1 * np.arange(3001) * 0.01), setting).log(), filters=False
+        )
         assert [r.name for r in fit.refused] == ["J_s"]
         assert "hardly accelerates" in fit.refused[0].reason
         assert fit.coefficients["b_s"].value == pytest.approx(B, rel=0.05)
         assert "steering_inertia" not in fit.vehicle()
 
+    @pytest.mark.slow
     def test_stuck_wheel_is_refused(self):
         fit = identify_steering_wheel(simulate_wheel(0.4 * np.sin(0.3 * TIME), REAL).log(), filters=False)
         assert not fit.coefficients
@@ -663,6 +672,21 @@ class TestRecording:
         for options in ({"preset": "other"}, {"guess": (-1.0, 1.0)}, {"delay": -0.1}, {"end_stop": 0.0}):
             with pytest.raises(cd.CodriverError):
                 identify_steering_wheel(real, **options)
+
+
+@pytest.mark.slow
+def test_a_car_on_the_road_is_refused(tmp_path):
+    """The driver's torque alone does not turn a car's wheel: the tyres and the assist motor are missing."""
+    names = tmp_path / "names.toml"
+    tables = (
+        '[steering_wheel_angle]\nsource = "angle"\nunit = "rad"\n',
+        '[steering_wheel_torque]\nsource = "torque"\nunit = "N*m"\n',
+    )
+    names.write_text("".join(tables))
+    log = cd.read(recording("udacity-lincoln-mkz") / "hmb1-20hz.csv", names=names)
+    fit = identify_steering_wheel(log, torques=["steering_wheel_torque"], filters=False)
+    assert not fit.coefficients
+    assert fit.findings[0].severity == "bad"
 
 
 class TestTorqueScale:

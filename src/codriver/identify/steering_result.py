@@ -107,6 +107,11 @@ class SteeringFit:
     torque_from: str
     source: str
 
+    def refused_together(self) -> list[tuple[str, str]]:
+        """Refusals with one reason together: their names, and the reason."""
+        reasons = dict.fromkeys(r.reason for r in self.refused)
+        return [(", ".join(r.name for r in self.refused if r.reason == why), why) for why in reasons]
+
     def vehicle(self, old: Vehicle | None = None, name: str = "wheel") -> Vehicle:
         """A vehicle with what was found; everything else is that of the old one, if there is one.
 
@@ -115,7 +120,8 @@ class SteeringFit:
         """
         if not self.coefficients:
             raise LogError(
-                f"{self.source}: " + "; ".join(f"{r.name}: {r.reason}" for r in self.refused), "at least one coefficient",
+                f"{self.source}: " + "; ".join(f"{names}: {why}" for names, why in self.refused_together()),
+                "at least one coefficient",
                 "record the wheel turned by its motor: a chirp from 0.3 to 4 Hz, some N m, hands off",
             )  # fmt: skip
         new = old or Vehicle(

@@ -39,7 +39,7 @@ PRESETS = {"okamoto2019": "euler"}
 REFUSED_SD = 0.2  # of J_s and b_s, as a share
 FRICTION_SD = 0.1  # N m, and a quarter of T_c
 AHEAD = 2.0  # s
-LEAST_R2 = 0.5  # of the angle so far ahead: below it the torque is not what turns the wheel
+GOOD_R2, LEAST_R2 = 0.8, 0.5  # of the angle so far ahead: below the second the torque is not what turns the wheel
 LAGS = 0.5  # s
 WHITE = 0.2  # greatest autocorrelation of innovations that goes without saying
 HALVES = 4.0  # standard errors
@@ -185,7 +185,7 @@ def _correlation(rows: Rows, best: Best) -> tuple[Array, Array]:
 def _findings(fit: SteeringFit, record: Record, elsewhere: int) -> list[Finding]:
     """What is to say."""
     x, said = fit.excitation, list(record.findings)
-    said += [Finding("bad", f"{r.name} is refused: {r.reason}") for r in fit.refused]
+    said += [Finding("bad", f"refused: {names}: {why}") for names, why in fit.refused_together()]
     if not fit.best.converged:
         said.append(Finding("bad", "the search did not come to rest: the figures are where it stopped"))
     for stop in fit.end_stops:
@@ -199,7 +199,7 @@ def _findings(fit: SteeringFit, record: Record, elsewhere: int) -> list[Finding]
         said.append(
             Finding("warn", f"{elsewhere} moments fit no motion of the wheel (encoder jumps, knocks); left out")
         )
-    if fit.r2 <= 0.8:
+    if fit.r2 <= GOOD_R2:
         said.append(Finding(
             "bad" if fit.r2 <= LEAST_R2 else "warn",
             f"the torque explains {max(fit.r2, 0):.0%} of the angle's changes within {AHEAD:g} s: hands on the wheel, a centring "

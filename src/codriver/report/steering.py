@@ -194,8 +194,8 @@ def _compared(fit: SteeringFit) -> Table:
         rows.append((p.name, *(x if np.isfinite(x) else None for x in numbers), said))
     return Table(
         ("way", "J_s, kg m²", "sd", "b_s, N m s/rad", "sd", "NIS", ""), tuple(rows),
-        "The filters have the paper's noise (85), no friction and no constant torque; their sd is what they claim. NIS far below "
-        "1: they expect more noise than there is.",
+        "The filters start from the guess, or else from what the fit found. They have the paper's noise (85), no friction and no "
+        "constant torque; their sd is what they claim. NIS far below 1: they expect more noise than there is.",
     )  # fmt: skip
 
 
