@@ -8,13 +8,15 @@ import pytest
 import codriver as cd
 from codriver.errors import LogError, UsageError
 from codriver.models import intention_model
-from codriver.observers import PRESETS, design_scaled_gain, find_preset
+from codriver.observers import PRESETS, design_scaled_gain, find_preset, save_preset
 from codriver.observers.jerk_forms import WIDE_START
 from codriver.observers.response import delay, noise_gain
 from codriver.observers.riccati import stationary_predicted, tick_map
 from codriver.observers.running_response import running_response
 from codriver.report.tuning import tuning_document
 from codriver.tune import Likelihood, calm_jerk, ell_for_delay, fit_noise, likely_ell, sensor_noise, tune
+from codriver.tune.likelihood import LEAST_BLOCKS
+from conftest import recording
 from test_offline import gappy_log
 
 PAPER = PRESETS["bisoffi2017"]
@@ -166,15 +168,14 @@ def test_stationary_covariance(paper, ell):
     rows = [[0, 1], [0], [], [0]]
     found = stationary_predicted([tick_map(design.F, design.Qd, C[here], np.diag(design.Rd)[here]) for here in rows])
     P = every_tick
-    for _ in range(40000 // len(rows)):
+    for _ in range(round(8000 / ell) // len(rows)):
         for here in rows:
             S = C[here] @ P @ C[here].T + design.Rd[np.ix_(here, here)]
             P = design.F @ (P - P @ C[here].T @ np.linalg.inv(S) @ C[here] @ P) @ design.F.T + design.Qd
     np.testing.assert_allclose(found, P, rtol=1e-6)
 
 
-@pytest.mark.parametrize("every", [(1, 1), (1, 5), (2, 3)])
-@pytest.mark.parametrize("ell", [1.0, 3.0])
+@pytest.mark.parametrize(("ell", "every"), [(3.0, (1, 1)), (3.0, (1, 5)), (1.0, (2, 3))])
 def test_the_running_filter_has_that_noise_and_delay(ell, every):
     """The estimator over a million ticks of white noise, row by row: 3 %. And over a ramp of jerk: 1 %."""
     n, found = 600_000, running_response(design_scaled_gain(PAPER, DT, ell), every)
@@ -255,8 +256,6 @@ def test_likelihood_whitens_the_innovations(tuned):
 
 
 def test_an_own_preset_is_used(tuned, demo, car, tmp_path):
-    from codriver.observers import save_preset
-
     save_preset(tuned["both"].preset, tmp_path / "mine.toml")
     estimate = cd.estimate_log("intent-pedals", demo.measured, car, preset=tmp_path / "mine.toml")
     assert float(estimate.provenance["delay_s"]) == pytest.approx(0.5, rel=1e-4)
@@ -279,8 +278,68 @@ def test_what_cannot_be_tuned(demo, car):
         tune([], "kinematic")
     with pytest.raises(UsageError, match="has no noise"):
         tune([demo.measured], "pedals-only", car)
+    with pytest.raises(UsageError, match="has no noise"):
+        tune([demo.measured], "pedals-only", car, delay=0.4)
     with pytest.raises(UsageError, match="neither a delay nor"):
         tune([demo.measured], "kinematic", likelihood=False)
+
+
+# What a new user gets wrong in one sensor, and what is said.
+WRONG = {
+    "sign": ("longitudinal_acceleration", lambda x: -x, "sign is wrong"),
+    "stuck at 0": ("longitudinal_acceleration", lambda x: 0 * x, "longitudinal_acceleration is 0 all the time"),
+    "mostly held": ("longitudinal_acceleration", lambda x: np.repeat(x[::50], 50)[: x.size], "has no scatter"),
+    "g": ("longitudinal_acceleration", lambda x: x / 9.81, "g read as"),
+    "km/h": ("longitudinal_speed", lambda x: 3.6 * x, "km/h read as"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+@pytest.mark.parametrize("options", [{}, {"delay": 0.4}], ids=["likelihood", "delay"])
+def test_drives_whose_data_contradict_are_refused(what, options, demo):
+    name, change, said = WRONG[what]
+    signal = demo.measured[name]
+    log = demo.measured.with_signals(cd.Signal(name, signal.time, change(signal.values), signal.unit))
+    with pytest.raises(LogError, match="not fit to tune on") as refused:
+        tune([demo.measured, log], "kinematic", **options)
+    assert said in str(refused.value)
+
+
+def test_a_stuck_sensor_on_a_steady_drive_is_refused():
+    """A constant speed to which the check has nothing to say: 1 m/s^2 of hill, nothing else."""
+    t, noise = np.arange(15_000) * DT, np.random.default_rng(0).standard_normal(15_000)
+    log = cd.Log.of([
+        cd.Signal("longitudinal_acceleration", t, 1 + 0.05 * noise, "m/s^2"),
+        cd.Signal("longitudinal_speed", t, np.full(t.size, 20.0), "m/s"),
+    ])  # fmt: skip
+    assert run(log).check().trusted
+    with pytest.raises(LogError, match="longitudinal_speed is 20 all the time"):
+        tune([log], "kinematic", delay=0.4)
+
+
+def test_standard_errors_need_blocks(demo):
+    """A short drive tells neither Q and R nor how sure ell is; it may still serve for a delay."""
+    short = demo.measured.between(20.0, 90.0)
+    with pytest.raises(LogError, match="at least 10 blocks, 100 s"):
+        tune([short], "kinematic")
+    one = tune([short], "kinematic", delay=0.4)
+    assert one.blocks < LEAST_BLOCKS
+    assert one.profile.spread == np.inf
+    said = " ".join(part for s in tuning_document(one).sections for part in s.parts if isinstance(part, str))
+    assert f"{one.blocks} blocks of 10 s count, 10 are needed" in said
+    # The band of the preset begun with is too narrow for it, which no wrong sensor is the cause of: at a larger ell it fits.
+    assert not run(short).check().trusted
+    assert run(short, one.profile.best).check().trusted
+    fit = fit_noise(Likelihood([run(short)]), PAPER, "own", "test")
+    assert not any(ratio.told or np.isfinite(ratio.spread) for ratio in fit.ratios)
+    # Two such drives have enough together.
+    assert np.isfinite(tune([short, demo.measured.between(90.0, 180.0)], "kinematic", delay=0.4).profile.spread)
+
+
+def test_the_zoe_scene_is_too_short():
+    log = cd.read(recording("nuscenes-zoe-scene-0103"))
+    with pytest.raises(LogError, match="1 block of 10 s: too few"):
+        tune([log], "kinematic")
 
 
 class TestCommand:
@@ -309,17 +368,42 @@ class TestCommand:
         assert "Delay against noise" in report.read_text(encoding="utf-8")
         assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.html", "mine.toml"]
 
-    def test_text(self, call):
-        ran = call("--delay", 0.4)
-        assert ran.exit_code == 0, ran.output
-        assert "kinematic tuned on drive.blf" in ran.stdout
-
     def test_nothing_is_overwritten(self, call, tmp_path):
         kept = tmp_path / "car.toml"
         kept.write_text('name = "a car"\n', encoding="utf-8")
         for wrong in (kept, tmp_path / "preset.txt", tmp_path / "bisoffi2017.toml", tmp_path / "none" / "x.toml"):
-            assert isinstance(call("--delay", 0.4, "-o", wrong).exception, UsageError)
+            for also in ((), ("--overwrite",)):
+                assert isinstance(call("--delay", 0.4, "-o", wrong, *also).exception, UsageError)
         assert kept.read_text(encoding="utf-8") == 'name = "a car"\n'
+
+    def test_a_preset_is_replaced_only_if_asked(self, call, tmp_path):
+        out = tmp_path / "mine.toml"
+        save_preset(cd.Preset((1, 1, 1, 1), (1, 1), 1.0, "test", "mine"), out)
+        before = out.read_bytes()
+        refused = call("--delay", 0.4, "-o", out).exception
+        assert isinstance(refused, UsageError)
+        assert "--overwrite" in str(refused)
+        assert out.read_bytes() == before
+        ran = call("--delay", 0.4, "-o", out, "--overwrite")
+        assert ran.exit_code == 0, ran.output
+        assert "kinematic tuned on drive.blf" in ran.stdout
+        assert find_preset(out).ell == pytest.approx(0.911 / 0.4, rel=0.01)
+
+    def test_preset_and_report_both_or_neither(self, call, tmp_path, monkeypatch):
+        monkeypatch.setattr("codriver.observers.save_preset", lambda preset, path: 1 / 0)
+        ran = call("--delay", 0.4, "-o", tmp_path / "mine.toml", "--report", tmp_path / "mine.html")
+        assert isinstance(ran.exception, ZeroDivisionError)
+        assert not list(tmp_path.iterdir())
+
+    @pytest.mark.parametrize("command", ["tune", "smooth"])
+    def test_help_offers_what_it_takes(self, command):
+        from typer.testing import CliRunner
+
+        from codriver.cli.app import app
+
+        said = CliRunner().invoke(app, [command, "--help"]).stdout
+        assert "kinematic" in said
+        assert "pedals-only" not in said
 
     def test_misuse(self, call):
         assert isinstance(call("--delay", -1).exception, UsageError)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from codriver.cli.estimate import estimate_file
-from codriver.cli.options import Bus, Dbc, Ell, EstimatorName, Json, LogPath, Names, PresetName, VehicleName
+from codriver.cli.options import Bus, Dbc, Ell, Json, LogPath, Names, PresetName, VehicleName
 
 if TYPE_CHECKING:
     from codriver.observers import Preset
@@ -17,8 +17,18 @@ if TYPE_CHECKING:
     from codriver.vehicles import Vehicle
 
 
+Smoothed = Annotated[
+    str,
+    typer.Argument(
+        metavar="ESTIMATOR",
+        help="intent-pedals, intent-torque, kinematic, or intent: the best the log can feed. Others have no such filter.",
+        show_default=False,
+    ),
+]
+
+
 def smooth(
-    estimator: EstimatorName,
+    estimator: Smoothed,
     log: LogPath,
     out: Annotated[
         Path, typer.Option("-o", "--out", metavar="OUT", help="Result: .parquet, .csv or .mf4.", show_default=False)

@@ -8,47 +8,50 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from codriver.cli.options import Bus, Dbc, EstimatorName, Json, Names, PresetName, VehicleName
+from codriver.cli.options import Bus, Dbc, Json, Names, PresetName, VehicleName
 
 if TYPE_CHECKING:
     from codriver.tune import Point, Tuning
 
 
+Tuned = Annotated[
+    str,
+    typer.Argument(
+        metavar="ESTIMATOR",
+        help="intent-pedals, intent-torque, kinematic, or intent: the best the log can feed. Others have no such noise.",
+        show_default=False,
+    ),
+]
+Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings of one vehicle.", show_default=False)]
+Delay = Annotated[
+    float | None,
+    typer.Option("--delay", metavar="S", help="Choose ell for this delay of slow changes, s.", show_default=False),
+]
+Fit = Annotated[bool, typer.Option("--likelihood", help="Fit Q and R by maximum likelihood. Default without --delay.")]
+Out = Annotated[
+    Path | None, typer.Option("-o", "--out", metavar="OUT", help="Preset to write (.toml).", show_default=False)
+]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a preset file that is there.")]
+Rate = Annotated[
+    float | None, typer.Option("--rate", help="Ticks per second. Default: from the logs.", show_default=False)
+]
+Report = Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)]
+
+
 def tune(
-    estimator: EstimatorName,
-    logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="Recordings of one vehicle.", show_default=False)
-    ],
-    vehicle: VehicleName = None,
-    dbc: Dbc = None,
-    names: Names = None,
-    delay: Annotated[
-        float | None,
-        typer.Option("--delay", metavar="S", help="Choose ell for this delay of slow changes, s.", show_default=False),
-    ] = None,
-    likelihood: Annotated[
-        bool, typer.Option("--likelihood", help="Fit Q and R by maximum likelihood. Default without --delay.")
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="OUT", help="Preset to write (.toml).", show_default=False)
-    ] = None,
-    rate: Annotated[
-        float | None, typer.Option("--rate", help="Ticks per second. Default: from the logs.", show_default=False)
-    ] = None,
-    preset: PresetName = None,
-    bus: Bus = None,
-    report: Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)] = None,
-    json: Json = False,
-) -> None:
+    estimator: Tuned, logs: Logs, vehicle: VehicleName = None, dbc: Dbc = None, names: Names = None, delay: Delay = None,
+    likelihood: Fit = False, out: Out = None, overwrite: Overwrite = False, rate: Rate = None, preset: PresetName = None,
+    bus: Bus = None, report: Report = None, json: Json = False,
+) -> None:  # fmt: skip
     """Tune the noise of an estimator on recorded drives: by likelihood, by a wanted delay, or both.
 
     Example: codriver tune intent drive.blf --dbc car.dbc --names names.toml --vehicle bisoffi2017 --delay 0.4 -o mine.toml
     """
-    from codriver.cli.estimate import check_report
+    from codriver.cli.estimate import check_report, check_with_vehicle
     from codriver.cli.options import check_inputs
     from codriver.cli.terminal import command_line, working
     from codriver.logs import read
-    from codriver.observers import find_preset, save_preset
+    from codriver.observers import find_preset
     from codriver.run import check_rate
     from codriver.tune import tune as tuned
     from codriver.vehicles import load_vehicle
@@ -57,7 +60,7 @@ def tune(
         check_inputs(log, dbc, names)
     inputs = [*logs, dbc, names, *(Path(name) for name in (vehicle, preset) if name is not None)]
     if out is not None:
-        _check_out(out, inputs)
+        _check_out(out, inputs, overwrite)
     check_report(report)
     check_rate(rate)
     if preset is not None:
@@ -67,17 +70,12 @@ def tune(
         stage(f"reading {', '.join(log.name for log in logs)}")
         recorded = [read(log, dbc=dbc, names=names, bus=bus) for log in logs]
         stage("tuning")
-        name = out.stem if out is not None else "own"
-        fit = True if likelihood else None
-        result = tuned(recorded, estimator, car, preset=preset, delay=delay, likelihood=fit, rate=rate, name=name)
+        result = tuned(
+            recorded, estimator, car, preset=preset, delay=delay, likelihood=True if likelihood else None, rate=rate,
+            name=out.stem if out is not None else "own", judge=lambda run: check_with_vehicle(run, run.log, car),
+        )  # fmt: skip
         stage("writing")
-        if report is not None:
-            from codriver.report.document import write_document
-            from codriver.report.tuning import tuning_document
-
-            write_document(tuning_document(result, str(out or ""), command_line()), report)
-        if out is not None:
-            save_preset(result.preset, out)
+        _write(result, out, report, command_line())
     told = told_of(result, out, report)
     if json:
         typer.echo(json_module.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
@@ -85,11 +83,32 @@ def tune(
         _say(result, told)
 
 
-def _check_out(out: Path, inputs: list[Path | None]) -> None:
+def _write(result: Tuning, out: Path | None, report: Path | None, command: str) -> None:
+    """Write preset and report: both or neither.
+
+    Raises:
+        LogError: a file cannot be written.
+    """
+    from contextlib import ExitStack
+
+    from codriver.logs.write import complete_or_nothing
+    from codriver.observers import save_preset
+    from codriver.report.document import write_document
+    from codriver.report.tuning import tuning_document
+
+    with ExitStack() as drafts:
+        if report is not None:
+            draft = drafts.enter_context(complete_or_nothing(report))
+            write_document(tuning_document(result, str(out or ""), command), draft)
+        if out is not None:
+            save_preset(result.preset, drafts.enter_context(complete_or_nothing(out)))
+
+
+def _check_out(out: Path, inputs: list[Path | None], overwrite: bool) -> None:
     """Whether a preset can be written here, asked before the long work.
 
     Raises:
-        UsageError: it cannot, or it would replace something that is no preset.
+        UsageError: it cannot, or it would replace an input, a preset without `overwrite`, or what is no preset.
     """
     import os
 
@@ -108,6 +127,8 @@ def _check_out(out: Path, inputs: list[Path | None]) -> None:
         return
     if any(path is not None and path.exists() and out.samefile(path) for path in inputs):
         raise UsageError(f"-o {out} is an input", "another name", "choose another -o; inputs are kept")
+    if not overwrite:
+        raise UsageError(f"-o {out} is there already", "the name of a new file", "choose another, or say --overwrite")
     try:
         find_preset(out)
     except UsageError:
@@ -122,6 +143,7 @@ def told_of(result: Tuning, out: Path | None, report: Path | None) -> dict[str, 
         "vehicle": result.vehicle,
         "logs": list(result.logs),
         "counted_s": round(result.seconds, 3),
+        "blocks": result.blocks,
         "rate_hz": round(1 / result.dt, 6),
         "sensor_noise": {"acceleration": _finite(result.sensors[0]), "speed": _finite(result.sensors[1])},
         "begun_with": result.begun.name,
@@ -162,6 +184,7 @@ def _say(result: Tuning, told: dict[str, Any]) -> None:
     from rich.table import Table
 
     from codriver.cli.terminal import console
+    from codriver.tune.likelihood import LEAST_BLOCKS
 
     out = console()
     out.print(
@@ -188,6 +211,8 @@ def _say(result: Tuning, told: dict[str, Any]) -> None:
             )
             out.print(f"  {r.name:<22} {r.start:.3g} -> {said}")
     out.print(f"\nat the Q and R of {result.begun.name} the rows are most likely for ell = {result.profile.best:.3g}")
+    if result.blocks < LEAST_BLOCKS:
+        out.print(f"how sure that is cannot be said: {result.blocks} blocks of 10 s count, {LEAST_BLOCKS} are needed")
     if told["result"]:
         out.print(f"\nwrote {escape(told['result'])}; use it with --preset {escape(told['result'])}")
     if told["report"]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from codriver.report.document import BLACK, COLORS, GREY, Chart, Curve, Document, Mark, Plot, Section, Table
 from codriver.tune import Point, Tuning, Whiteness
+from codriver.tune.likelihood import LEAST_BLOCKS
 
 _QUICK = 0.2  # s; below it ripples of body and driveline pass for intention
 _BEGUN, _OWN = COLORS[0], COLORS[1]
@@ -106,6 +107,10 @@ def _likelihood(result: Tuning) -> Section:
         "How well the rows are foreseen, one tick ahead. It is no measure of how well the intention is found.", log_x=True,
     )  # fmt: skip
     parts: list[str | Chart | Table] = [chart]
+    if result.blocks < LEAST_BLOCKS:
+        parts.append(
+            f"How sure the most likely ell is cannot be said: {result.blocks} blocks of 10 s count, {LEAST_BLOCKS} are needed."
+        )
     fit = result.noise
     if fit is not None:
         ending = (

@@ -15,7 +15,7 @@ from codriver.errors import DesignError, UsageError
 from codriver.observers.response import delay
 from codriver.observers.scaled_gain import ELL_RANGE, Preset, design_scaled_gain
 from codriver.signals.signal import Array
-from codriver.tune.likelihood import Evidence, Likelihood
+from codriver.tune.likelihood import LEAST_BLOCKS, Evidence, Likelihood
 
 GRID = (0.25, 24.0, 27)  # ells of the profile: from, to, number
 _STEP = 0.02  # of log ell, for slope and curvature
@@ -28,7 +28,8 @@ class KnobProfile:
     Attributes:
         ell, log_likelihood: the profile, shape (n,); NaN where there is no filter.
         best: the most likely ell.
-        spread: standard error of its logarithm, from curvature and blocks (see `noise`); infinite at the grid's end.
+        spread: standard error of its logarithm, from curvature and blocks (see `noise`); infinite at the grid's end, and
+            with too few blocks.
         found: the evidence there.
     """
 
@@ -84,6 +85,8 @@ def likely_ell(likelihood: Likelihood, preset: Preset) -> KnobProfile:
 
 def _spread(likelihood: Likelihood, preset: Preset, best: float, found: Evidence) -> float:
     """Standard error of log ell."""
+    if likelihood.blocks < LEAST_BLOCKS:
+        return float("inf")
     try:
         up, down = (likelihood.at(preset, best * exp(sign * _STEP)) for sign in (1, -1))
     except DesignError:

@@ -39,6 +39,7 @@ from codriver.signals.signal import Array
 SETTLING, AFTER_SHIFT = 2.0, 1.0  # s
 BLOCK = 10.0  # s; longer than innovations lean to one side
 LEAST_ROWS = 1000
+LEAST_BLOCKS = 10  # for standard errors; see docs/tuning.md
 _PAIRS = [(i, j) for i in range(4) for j in range(i, 4)]
 _STATE = ["input_before", *(f"x_{s}" for s in STATES), *(f"P_{STATES[i]}_{STATES[j]}" for i, j in _PAIRS)]
 _NOISE = [*(f"Qd_{i}{j}" for i, j in _PAIRS), "Rd_0", "Rd_1", *(f"P_{i}" for i in range(4))]
@@ -93,6 +94,11 @@ class Likelihood:
             )  # fmt: skip
         self._program = compile(_recursion(self.dt))
 
+    @property
+    def blocks(self) -> int:
+        """How many whole blocks the time that counts makes up."""
+        return whole_blocks(self.seconds)
+
     def at(self, preset: Preset, ell: float) -> Evidence:
         """The evidence for a noise.
 
@@ -132,6 +138,11 @@ class Likelihood:
                 )  # fmt: skip
             found.append((e * e / s, np.log(s)))
         return found
+
+
+def whole_blocks(seconds: float) -> int:
+    """How many whole blocks so much time makes up."""
+    return int(seconds / BLOCK + 1e-9)
 
 
 def _rows(run: Estimate) -> Grid:

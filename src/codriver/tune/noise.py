@@ -12,7 +12,7 @@ What rows can tell and what not:
 
 Standard errors of theta are those of H^-1 J H^-1 with H the curvature and J from the slopes of blocks of 10 s, since a
 driver's innovations lean to one side for a while and curvature alone would take each for news (White 1982,
-doi:10.2307/1912526).
+doi:10.2307/1912526). With fewer than LEAST_BLOCKS blocks there are none, and nothing is told.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import numpy as np
 from codriver.errors import DesignError
 from codriver.observers.scaled_gain import Preset
 from codriver.signals.signal import Array
-from codriver.tune.likelihood import Evidence, Likelihood
+from codriver.tune.likelihood import LEAST_BLOCKS, Evidence, Likelihood
 
 NAMES = ("Q of the speed", "Q of the acceleration", "Q of the offset", "Q of the jerk", "R of the speed")
 FARTHEST = log(1e6)  # no ratio moves farther from the preset begun with
@@ -116,7 +116,8 @@ def fit_noise(
     theta, last = np.asarray(search.x, float), evidence(search.x)
     better = last is not None and last.log_likelihood > begun.log_likelihood
     theta, found = (theta, last) if better and last is not None else (np.zeros(len(NAMES)), begun)
-    spreads = _spreads(evidence, theta, found)
+    enough = likelihood.blocks >= LEAST_BLOCKS
+    spreads = _spreads(evidence, theta, found) if enough else np.full(theta.size, np.inf)
     sides = [[evidence(theta + side) for side in (-TOLD * e, TOLD * e)] for e in np.eye(theta.size)]
     peaked = [all(s is None or s.log_likelihood < found.log_likelihood - FALL for s in pair) for pair in sides]
     ratios = tuple(

@@ -10,7 +10,7 @@ intention, so look at the delay that comes out before you use it (docs/tuning.md
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
@@ -26,9 +26,11 @@ from codriver.program import compile
 from codriver.run import check_rate, choose
 from codriver.signals import Log
 from codriver.signals.signal import Array
+from codriver.trust import Check
 from codriver.tune.curve import ELLS, Point, calm_jerk, point, sensor_noise, ticks_between
+from codriver.tune.drives_fit import refuse_doubtful, refuse_short, refuse_stuck
 from codriver.tune.knob import KnobProfile, ell_for_delay, likely_ell
-from codriver.tune.likelihood import Evidence, Likelihood
+from codriver.tune.likelihood import Evidence, Likelihood, whole_blocks
 from codriver.tune.noise import NoiseFit, fit_noise
 from codriver.vehicles import Vehicle, load_vehicle
 
@@ -97,6 +99,11 @@ class Tuning:
     before: tuple[Whiteness, ...]
     after: tuple[Whiteness, ...]
 
+    @property
+    def blocks(self) -> int:
+        """Whole blocks that the time that counts makes up; standard errors need LEAST_BLOCKS."""
+        return whole_blocks(self.seconds)
+
 
 def tune(
     logs: Sequence[Log],
@@ -108,6 +115,7 @@ def tune(
     likelihood: bool | None = None,
     rate: float | None = None,
     name: str = "own",
+    judge: Callable[[Estimate], Check] = Estimate.check,
 ) -> Tuning:
     """Tune the noise and the knob of an estimator of the intention.
 
@@ -120,60 +128,108 @@ def tune(
         likelihood: whether to fit Q and R; by default where no delay is asked for.
         rate: ticks per second; None takes that of the quickest measurement.
         name: of the preset made.
+        judge: the verdict on an estimate; by default what it says of itself (`check()`).
 
     Raises:
         UsageError: an option that cannot be, or an estimator without noise to tune.
         MissingSignal: a log lacks a signal.
         VehicleError: the vehicle is missing, or lacks a parameter.
-        LogError: too little of the drives counts.
+        LogError: too little of the drives counts, their data contradict themselves, or a sensor is stuck.
         DesignError: there is no filter for the preset begun with.
     """
-    if not logs:
-        raise UsageError("no drives", "at least one", "give a recording")
-    if delay is None and likelihood is False:
-        raise UsageError("neither a delay nor the likelihood", "one of them at least", "say what to tune by")
-    check_rate(rate)
+    fit = _asked(logs, delay, likelihood, rate)
     if isinstance(vehicle, (str, Path)):
         vehicle = load_vehicle(vehicle)
-    chosen_name, _ = choose(estimator, logs[0], vehicle)
+    chosen_name, measured = _chosen(estimator, logs[0], vehicle)
     begun = find_preset(preset if preset is not None else _DEFAULT)
-    probe = build(chosen_name, vehicle, preset=begun)
-    # A fused estimator carries these states by other names: its ell is that of another filter.
-    if not {f"x_{state}" for state in STATES} <= set(probe.carry):
-        raise UsageError(
-            f"{chosen_name} has no noise that could be tuned so",
-            "intent-pedals, intent-torque or kinematic",
-            "choose one",
-        )
-    dt = 1.0 / (rate or max(suggest_rate(log, probe.measured) for log in logs))
+    dt = 1.0 / (rate or max(suggest_rate(log, measured) for log in logs))
 
     def runs(noise: Preset, ell: float) -> list[Estimate]:
         program = compile(build(chosen_name, vehicle, dt=dt, ell=ell, preset=noise))
         return [program.run(log) for log in logs]
 
     first = runs(begun, begun.ell)
-    rows, every, sensors = Likelihood(first), ticks_between(first), sensor_noise(first)
+    refuse_stuck(first)
+    rows = Likelihood(first)
     profile = likely_ell(rows, begun)
-    source = f"tuned on {', '.join(_short(log) for log in logs)}, from {begun.name}"
+    refuse_doubtful(first, lambda: runs(begun, profile.best), judge)
     fitted = None
-    if likelihood or (likelihood is None and delay is None):
-        fitted = fit_noise(rows, begun, name, f"{source}, by maximum likelihood", profile.best)
-    noise = fitted.preset if fitted is not None else replace(begun, name=name, source=source)
-    ell = begun.ell if delay is None else ell_for_delay(noise, delay)
-    if delay is not None:
-        noise = replace(noise, ell=ell, source=f"{noise.source}, ell for a delay of {delay:g} s")
-    last = runs(noise, ell)
-    at = lambda p, e, r=None: point(p, e, dt, every, sensors, calm_jerk(r) if r is not None else None)  # noqa: E731
-    marks = tuple(at(begun, e, first if e == begun.ell else runs(begun, e)) for e in USUAL)
-    own = at(noise, ell, last)
-    # The curve goes through the same delays for either noise.
-    per_ell = own.slow_delay * ell / (marks[0].slow_delay * marks[0].ell)
+    if fit:
+        refuse_short(rows)
+        fitted = fit_noise(rows, begun, name, "by maximum likelihood", profile.best)
+    noise = _named(fitted.preset if fitted is not None else begun, name, begun, delay, logs, fit)
+    last = runs(noise, noise.ell)
     return Tuning(
-        chosen_name, vehicle.name if vehicle is not None else "", tuple(_short(log) for log in logs), rows.seconds, dt, every,
-        sensors, begun, noise, delay, fitted, profile, rows.at(noise, ell),
-        tuple(at(noise, min(e * per_ell, 100.0)) for e in ELLS), tuple(at(begun, e) for e in ELLS), marks, own,
-        whiteness(first), whiteness(last),
+        chosen_name, vehicle.name if vehicle is not None else "", tuple(_short(log) for log in logs), rows.seconds, dt,
+        ticks_between(first), sensor_noise(first), begun, noise, delay, fitted, profile, rows.at(noise, noise.ell),
+        *_place(begun, first, noise, last, runs), whiteness(first), whiteness(last),
     )  # fmt: skip
+
+
+def _asked(logs: Sequence[Log], delay: float | None, likelihood: bool | None, rate: float | None) -> bool:
+    """Whether Q and R are to be fitted.
+
+    Raises:
+        UsageError: nothing is asked for, or what cannot be.
+    """
+    if not logs:
+        raise UsageError("no drives", "at least one", "give a recording")
+    if delay is None and likelihood is False:
+        raise UsageError("neither a delay nor the likelihood", "one of them at least", "say what to tune by")
+    check_rate(rate)
+    return bool(likelihood) or (likelihood is None and delay is None)
+
+
+def _chosen(estimator: str, log: Log, vehicle: Vehicle | None) -> tuple[str, tuple[str, ...]]:
+    """The estimator meant, and what it measures.
+
+    Raises:
+        UsageError: there is none of that name, or it has no noise to tune.
+        MissingSignal: the log feeds none.
+        VehicleError: the vehicle is missing, or lacks a parameter.
+    """
+    name, _ = choose(estimator, log, vehicle)
+    probe = build(name, vehicle)
+    # A fused estimator carries these states by other names: its ell is that of another filter.
+    if not {f"x_{state}" for state in STATES} <= set(probe.carry):
+        raise UsageError(
+            f"{name} has no noise that could be tuned so",
+            "intent-pedals, intent-torque or kinematic",
+            "choose one",
+        )
+    return name, probe.measured
+
+
+def _named(noise: Preset, name: str, begun: Preset, delay: float | None, logs: Sequence[Log], fitted: bool) -> Preset:
+    """The preset with its name, where it comes from, and the ell for the delay asked for.
+
+    Raises:
+        UsageError: no ell has that delay.
+    """
+    source = f"tuned on {', '.join(_short(log) for log in logs)}, from {begun.name}"
+    source += ", by maximum likelihood" if fitted else ""
+    if delay is None:
+        return replace(noise, name=name, source=source)
+    source += f", ell for a delay of {delay:g} s"
+    return replace(noise, name=name, source=source, ell=ell_for_delay(noise, delay))
+
+
+def _place(
+    begun: Preset, first: Sequence[Estimate], noise: Preset, last: Sequence[Estimate],
+    runs: Callable[[Preset, float], list[Estimate]],
+) -> tuple[tuple[Point, ...], tuple[Point, ...], tuple[Point, ...], Point]:  # fmt: skip
+    """The curves of the noise found and of that begun with, the usual settings and the one chosen."""
+    dt, every, sensors = first[0].grid.dt, ticks_between(first), sensor_noise(first)
+
+    def at(preset: Preset, ell: float, measured: Sequence[Estimate] | None = None) -> Point:
+        return point(preset, ell, dt, every, sensors, calm_jerk(measured) if measured is not None else None)
+
+    marks = tuple(at(begun, ell, first if ell == begun.ell else runs(begun, ell)) for ell in USUAL)
+    own = at(noise, noise.ell, last)
+    # The curve goes through the same delays for either noise.
+    per_ell = own.slow_delay * noise.ell / (marks[0].slow_delay * marks[0].ell)
+    curve = tuple(at(noise, min(ell * per_ell, 100.0)) for ell in ELLS)
+    return curve, tuple(at(begun, ell) for ell in ELLS), marks, own
 
 
 def whiteness(runs: Sequence[Estimate]) -> tuple[Whiteness, ...]:
