@@ -6,6 +6,7 @@ import json
 import re
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,9 @@ from codriver.cli import main
 from codriver.errors import LogError, MissingSignal, UsageError
 from codriver.identify import check_vehicle_against_log, identify_brake, identify_pedal, identify_ratio
 from codriver.identify.brake_rows import drive_rows, halves
+from codriver.identify.brake_verdict import brake_findings
 from codriver.identify.low_pass import centred, low_pass, rate, smooth
+from codriver.identify.ratio_verdict import ratio_findings
 from codriver.identify.regression import regress, solve, trimmed_rows
 from codriver.identify.standard_errors import (
     autocorrelation,
@@ -29,7 +32,7 @@ from codriver.identify.standard_errors import (
 )  # fmt: skip
 from codriver.identify.usable import usable, widened
 from codriver.report.document import write_document
-from codriver.report.identification import brake_document, brake_findings, pedal_document, ratio_document
+from codriver.report.identification import brake_document, pedal_document, ratio_document
 from codriver.vehicles import save_vehicle
 from conftest import recording
 
@@ -358,7 +361,7 @@ class TestBrakeOnTheRoadTest:
         wrong = identify_brake(road, car.with_parameter("mass", 1.1 * M, source="wrong"))
         assert wrong.coefficients["gamma"].value == pytest.approx(1 - (1 - PITCH) / 1.1, abs=0.01)
         assert wrong.coefficients["c_b"].value == pytest.approx(C_B, rel=0.01)
-        assert any("no pitch" in text for severity, text in brake_findings(wrong) if severity == "bad")
+        assert any("no pitch" in f.text for f in brake_findings(wrong) if f.severity == "bad")
 
     def test_mass_alone_moves_c_b_where_pitch_is_not_fitted(self, road, car):
         right, wrong = (
@@ -477,7 +480,7 @@ class TestRefusals:
         assert "kappa_2" not in found.coefficients
         assert found.coefficients["c_b"].value == pytest.approx(C_B, rel=0.1)
         assert found.vehicle(car).parameters["drag"] == car.parameters["drag"]
-        assert any("kappa_2 is refused" in text for _, text in brake_findings(found))
+        assert any("kappa_2 is refused" in f.text for f in brake_findings(found))
 
     def test_too_short(self, car):
         with pytest.raises(LogError, match="only 0"):
@@ -579,7 +582,7 @@ class TestUnsound:
 
     def test_two_rows(self, car):
         log = synthetic(20).between(3.0, 3.015)
-        with pytest.raises(LogError, match="has 2 samples over 0.01 s"):
+        with pytest.raises(LogError, match=r"has 2 samples over 0\.01 s"):
             identify_brake(log, car)
 
 
@@ -608,6 +611,108 @@ class TestSaturation:
         said = {f.severity: f.text for f in check_vehicle_against_log(cut, wrong)}
         assert "c_b or the unit" in said["bad"]
         assert all(f.severity == "ok" for f in check_vehicle_against_log(part, car))
+
+
+class TestVerdict:
+    """What condemns itself makes no vehicle file."""
+
+    def refused(self, log: cd.Log, car: cd.Vehicle) -> str:
+        with pytest.raises(LogError) as error:
+            identify_brake(log, car).vehicle(car)
+        return error.value.found
+
+    def test_torque_of_the_wrong_sign(self, road, car):
+        said = self.refused(changed(road, "engine_torque", lambda x: -x), car)
+        assert "for a constant" in said
+        assert "sign" in said
+
+    def test_gear_stuck(self, road, car):
+        stuck = changed(road, "gear", lambda g: 0 * g + 3)
+        assert "that of another gear than the log names (gear 3 of the log: mostly gear 5)" in self.refused(stuck, car)
+        assert "do not fit at all" in self.refused(stuck.without("engine_speed"), car)
+        assert not any(f.severity == "ok" for f in brake_findings(identify_brake(stuck, car)))
+        said = [f for f in check_vehicle_against_log(stuck, car) if f.severity == "bad"]
+        assert any("that of gear 5 fits" in f.text for f in said)
+
+    def test_gear_shifted(self, road, car):
+        shifted = changed(road.without("engine_speed"), "gear", lambda g: np.maximum(g - 1, 1))
+        assert "no pitch" in self.refused(shifted, car)
+
+    def test_far_from_the_old_value(self, road, car):
+        found = identify_brake(changed(road, "brake_pressure", lambda p: 10 * p), car)
+        told = [f.text for f in brake_findings(found) if f.severity == "warn"]
+        assert told == [
+            "c_b is 0.1 times the vehicle's old value: if that was right, then the unit of the pressure, the mass or the gear "
+            "is wrong"
+        ]
+        assert found.vehicle(car).number("brake_coefficient") == pytest.approx(C_B / 10, rel=0.01)
+
+    @pytest.mark.parametrize(
+        ("name", "value", "words"), [("kappa_1", -900.0, "kappa_1 - M d_a is -900 N"), ("kappa_2", 1.5, "kappa_2 is 1.5 kg/m")]
+    )  # fmt: skip
+    def test_no_such_vehicle(self, fit, car, name, value, words):
+        odd = replace(fit, coefficients={**fit.coefficients, name: replace(fit.coefficients[name], value=value)})
+        with pytest.raises(LogError, match=re.escape(words)):
+            odd.vehicle(car)
+        assert fit.vehicle(car).number("drag") == fit.coefficients["kappa_2"].value
+
+    def test_pressure_in_a_unit_far_off(self, road, car):
+        found = identify_brake(changed(road, "brake_pressure", lambda p: p / 60), car)
+        assert found.coefficients.get("c_b") is None
+        assert any("unit of brake_pressure is suspect" in r.reason for r in found.refused)
+
+    def test_too_short_is_the_reason_told(self, car):
+        found = identify_brake(synthetic(16, seed=3), car)
+        for refusal in found.refused:
+            if refusal.name in ("gamma", "kappa_2") and "more than" in refusal.reason:
+                assert float(re.search(r"error (\S+),", refusal.reason)[1]) > 0.02
+
+    @pytest.mark.parametrize("bias", [float("nan"), 500.0, -3.0])
+    def test_bias_that_is_none(self, car, bias):
+        with pytest.raises(UsageError, match="an accelerometer's bias"):
+            identify_brake(synthetic(30), car, bias=bias)
+
+    def test_pedal_and_its_old_value(self, demo, car):
+        found = identify_pedal(changed(demo.measured, "accelerator_pedal", lambda p: p / 2), car)
+        assert any("c_r is 2 times" in f.text for f in found.findings)
+        spoilt = changed(demo.measured, "longitudinal_acceleration", g_units)
+        assert any("g read as m/s^2" in f.text for f in identify_pedal(spoilt, car).findings)
+        assert len(identify_pedal(demo.measured, car).findings) == 1
+
+
+class TestRatioVerdict:
+    def refused(self, log: cd.Log, car: cd.Vehicle) -> str:
+        with pytest.raises(LogError) as error:
+            identify_ratio(log).vehicle(car)
+        return error.value.found
+
+    def test_no_agreement_with_an_engine_that_is_not_there(self, road, ratios, car):
+        assert next(f.text for f in ratio_findings(ratios, car)).endswith("and agrees with the engine's speed")
+        silent = ratio_findings(identify_ratio(road.without("engine_speed")), car)
+        assert [f.text for f in silent] == ["every gear that was driven is told; no engine speed to hold against it"]
+
+    def test_gears_numbered_in_another_way(self, road, car):
+        for work in (lambda g: np.where(g > 0, g + 1, g), lambda g: np.maximum(g - 1, 1)):
+            shifted = changed(road.without("engine_speed"), "gear", work)
+            assert "are the gears numbered in another way" in self.refused(shifted, car)
+        up = changed(road, "gear", lambda g: np.where(g > 0, g + 1, g))
+        assert "the log has a gear 6, and the vehicle 5" in self.refused(up, car)
+
+    def test_torque_doubled(self, road, car):
+        doubled = changed(road, "engine_torque", lambda x: 2 * x)
+        assert "engine speed over speed (gear 1 0.46" in self.refused(doubled, car)
+        said = ratio_findings(identify_ratio(doubled.without("engine_speed")), car)
+        assert [f.severity for f in said] == ["warn"]
+        assert "gear 5 0.5; if that was right, the torque's unit" in said[0].text
+
+    def test_gear_stuck(self, road, car):
+        said = self.refused(changed(road, "gear", lambda g: 0 * g + 3), car)
+        assert "not one number within a gear" in said
+        assert "do not fit at all" in said
+
+    def test_sign_is_the_reason_told(self, road):
+        with pytest.raises(LogError, match="the sign of engine_torque"):
+            identify_ratio(changed(road, "engine_torque", lambda x: -x))
 
 
 class TestPedal:
@@ -722,6 +827,12 @@ class TestVehicleAgainstLog:
         said = self.worst(shifted, car)
         assert "that of gear 4 fits" in said
         assert "it differs by gear" in self.worst(shifted.without("engine_speed"), car)
+
+    def test_the_accelerometer_comes_first(self, demo, car):
+        """In g it contradicts the change of speed; M, tau and torque are not blamed."""
+        said = self.worst(changed(demo.measured, "longitudinal_acceleration", g_units), car)
+        assert said.startswith("bad: accelerometer and change of speed")
+        assert "M is too" not in said
 
     def test_bar_for_pascal(self, demo, car):
         assert "bar taken for Pa" in self.worst(changed(demo.measured, "brake_pressure", lambda p: p * 1e-5), car)
@@ -884,6 +995,27 @@ class TestCommand:
         assert code == 1
         assert "to do:" in err
         assert [p.name for p in tmp_path.iterdir()] == ["flat.csv"]
+
+    @pytest.mark.parametrize("bias", ["nan", "500", "inf"])
+    def test_bias_is_checked_first(self, run, can, tmp_path, bias):
+        options = ("--vehicle", "bisoffi2017", "-o", tmp_path / "v.toml", "--bias", bias, "--json")
+        code, out, err = run("identify", "brake", *can, *options)
+        assert (code, out) == (2, "") or code == 1
+        assert "an accelerometer's bias" in err
+        assert list(tmp_path.iterdir()) == []
+
+    def test_condemned_writes_nothing(self, run, tmp_path, road, car):
+        flipped = tmp_path / "flipped.csv"
+        names = ("longitudinal_speed", "longitudinal_acceleration", "brake_pressure", "engine_torque", "gear")
+        grid = changed(road.between(0, 900), "engine_torque", lambda x: -x).sample(names, 0.02, start=1.0)
+        table = np.column_stack([grid.time, *(grid.values[name] for name in names)])
+        table = table[np.isfinite(table).all(axis=1)]
+        np.savetxt(flipped, table, "%.6g", ",", header="time," + ",".join(names), comments="")
+        out = tmp_path / "v.toml"
+        code, _, err = run("identify", "brake", flipped, "--vehicle", "bisoffi2017", "-o", out)
+        assert code == 1
+        assert "for a constant" in err
+        assert not out.exists()
 
     def test_check_vehicle(self, run, can, tmp_path, car):
         log, *options = can

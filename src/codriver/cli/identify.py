@@ -5,6 +5,7 @@ from __future__ import annotations
 import json as json_module
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -56,10 +57,15 @@ def brake(
     Example: codriver identify brake drive.blf --dbc car.dbc --names names.toml --vehicle car.toml -o car2.toml
     """
 
+    from codriver.identify.plausible import check_bias
+
+    check_bias(bias)
+
     def work(recorded: list[Log], old: Vehicle, command: str) -> tuple[Vehicle, Document, Told]:
         from codriver.identify import identify_brake
+        from codriver.identify.brake_verdict import brake_findings
         from codriver.identify.usable import REASONS
-        from codriver.report.identification import brake_document, brake_findings, brake_rows
+        from codriver.report.identification import brake_document, brake_rows
 
         fit = identify_brake(recorded, old, bias=bias, pitch=pitch)
         told = {
@@ -77,7 +83,7 @@ def brake(
             "outliers": fit.trimmed,
             "block_s": fit.block,
             "rows": brake_rows(fit, old),
-            "findings": _findings(brake_findings(fit)),
+            "findings": _findings((f.severity, f.text) for f in brake_findings(fit)),
         }  # fmt: skip
         return fit.vehicle(old), brake_document(fit, old, command), told
 
@@ -132,31 +138,12 @@ def ratio(
 
     def work(recorded: list[Log], old: Vehicle, command: str) -> tuple[Vehicle, Document, Told]:
         from codriver.identify import identify_ratio
+        from codriver.identify.ratio_verdict import ratio_findings
         from codriver.identify.usable import REASONS
         from codriver.report.identification import ratio_document, ratio_rows
 
         fit = identify_ratio(recorded)
         new = fit.vehicle(old)
-        found = [("warn", f"gear {gear} is refused: {why}") for gear, why in fit.refused.items()]
-        if fit.gain is None:
-            found.append(
-                (
-                    "warn",
-                    "the roads are too level to tell the accelerometer's gain error (pitch), which is in the ratios",
-                )
-            )
-        for gear, turns in fit.engine_turns.items():
-            share = new.numbers("transmission")[gear - 1] / turns if gear <= len(new.numbers("transmission")) else None
-            if share is not None and not 0.8 <= share <= 1.02:
-                found.append(
-                    (
-                        "bad",
-                        f"gear {gear}: tau is {share:.2f} times engine speed over speed, 0.8 to 1 is right: is M right?",
-                    )
-                )
-        found = found or [
-            ("ok", "every gear that was driven is told, and agrees with the engine's speed where there is one")
-        ]
         told = {
             "coefficients": {
                 f"tau/M gear {g.gear}": {"value": g.ratio, "sd": g.sd, "sd_newey_west": g.sd_hac, "unit": "1/(kg*m)"}
@@ -170,7 +157,7 @@ def ratio(
             "left_out": {REASONS[reason]: part for reason, part in fit.share.items()},
             "block_s": fit.block,
             "rows": ratio_rows(fit, old),
-            "findings": _findings(found),
+            "findings": _findings((f.severity, f.text) for f in ratio_findings(fit, old)),
         }  # fmt: skip
         return new, ratio_document(fit, old, command), told
 
@@ -197,6 +184,15 @@ def _run(
         recorded = [read(path, dbc=dbc, names=names, bus=bus) for path in paths]
         stage("identifying")
         new, document, told = work(recorded, old, command_line())
+    told = {"logs": [str(path) for path in paths], "vehicle": old.name, **told, "result": str(out),
+            "report": str(report) if report is not None else None}  # fmt: skip
+    # What cannot be said fails before anything is written.
+    text = json_module.dumps(
+        _finite({key: value for key, value in told.items() if key != "rows"}),
+        indent=2,
+        ensure_ascii=False,
+        allow_nan=False,
+    )
     # The report goes first, to a name of its own; it is renamed when the vehicle is there too.
     draft = report.with_name(f".{report.name}.draft") if report is not None else None
     try:
@@ -208,11 +204,8 @@ def _run(
     finally:
         if draft is not None:
             draft.unlink(missing_ok=True)
-    told = {"logs": [str(path) for path in paths], "vehicle": old.name, **told, "result": str(out),
-            "report": str(report) if report is not None else None}  # fmt: skip
     if as_json:
-        del told["rows"]
-        typer.echo(json_module.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
+        typer.echo(text)
     else:
         _say(told)
 
@@ -238,6 +231,15 @@ def _check_outputs(out: Path, report: Path | None, inputs: Sequence[Path], overw
             raise UsageError(f"{option} {path} is an input", "another name", "choose another; inputs are kept")
     if out.exists() and not overwrite:
         raise UsageError(f"-o {out} is there already", "the name of a new file", "choose another, or say --overwrite")
+
+
+def _finite(told: Any) -> Any:
+    """The same with None for numbers that JSON does not have."""
+    if isinstance(told, Mapping):
+        return {key: _finite(value) for key, value in told.items()}
+    if isinstance(told, list | tuple):
+        return [_finite(value) for value in told]
+    return None if isinstance(told, float) and not isfinite(told) else told
 
 
 def _findings(said: Any) -> list[dict[str, str]]:

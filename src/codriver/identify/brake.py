@@ -16,14 +16,17 @@ their own standard deviations carry.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from codriver.errors import LogError
 from codriver.identify.brake_fit import PARAMETERS, BrakeFit, Coefficient, Refusal
 from codriver.identify.brake_rows import SIGNALS, DriveRows, drive_rows, halves, short_name
+from codriver.identify.brake_verdict import remarks
+from codriver.identify.gear_by_engine import wrong_gears
 from codriver.identify.learning import learning_curve
-from codriver.identify.plausible import check_bias
+from codriver.identify.plausible import BRAKE_PER_MASS, check_bias
 from codriver.identify.regression import Regression, regress, rms, solve
 from codriver.identify.sound import refuse_unsound
 from codriver.identify.standard_errors import autocorrelation
@@ -35,7 +38,6 @@ from codriver.vehicles import Vehicle
 # Greatest standard error: of the value, or in a unit of its own, whichever is larger.
 BRAKE_SD, DRAG_SD, GAIN_SD, OFFSET_SD = 0.1, 0.25, 0.02, 0.05  # share, share, absolute, m/s^2
 LEAST_FREEDOM = 4
-ODD_GAIN = 0.06  # gamma beyond it is no pitch: mass, tau or a sensor's scale
 # What counts as no signal at all: m/s^2, m^2/s^2, Pa, RMS.
 _NOTHING = {"gamma": 1e-4, "kappa_2": 1e-3, "c_b": 1.0}
 
@@ -68,7 +70,7 @@ def identify_brake(
     logs = [logs] if isinstance(logs, Log) else list(logs)
     M, taus = vehicle.number("mass"), vehicle.numbers("transmission")
     check_bias(bias)
-    refuse_unsound(logs, SIGNALS)
+    odd = refuse_unsound(logs, SIGNALS)
     rows = drive_rows(logs, len(taus), dt, known_gears=True)
     first, second = halves(rows.keep, rows.pieces)
     _enough(first, rows, logs)
@@ -89,14 +91,16 @@ def identify_brake(
     e = rows.y - model
     most = max(min(round(4 * fit.length), 2000), 10)
     curve = learning_curve(X, force - M * rows.y - fixed, rows.y, force - fixed, fit, rows, second, M, names)
-    return BrakeFit(
+    found = BrakeFit(
         coefficients, tuple(refused), tuple(offsets), bias is not None, _minutes(first, dt), _minutes(second, dt),
         _minutes(first & rows.pressed, dt), rows.share, float(rows.keep.mean()), fit.trimmed,
         rms(e[second]), _old(rows, force, vehicle, M, first, second),
         rms(rows.y[second] - rows.y[first].mean()), fit.length * dt, fit.blocks, curve, rows, model, fit.used, second,
-        np.arange(most + 1, dtype=float) * dt, autocorrelation(e, fit.used, rows.pieces, most),
-        tuple(short_name(log) for log in logs),
+        np.arange(most + 1, dtype=float) * dt, autocorrelation(e, fit.used, rows.pieces, most), M,
+        sources=tuple(short_name(log) for log in logs),
     )  # fmt: skip
+    said = (*odd, *rows.clipped, *wrong_gears(logs, rows, taus), *remarks(found, vehicle, np.array(taus)))
+    return replace(found, remarks=said)
 
 
 def _enough(first: Flags, rows: DriveRows, logs: Sequence[Log]) -> None:
@@ -149,20 +153,28 @@ def _badly_told(fit: Regression, names: list[str], M: float) -> tuple[str, str]:
     """Which column the drive does not tell, and why; empty if it tells all. gamma goes first, for it widens the others."""
     if "gamma" in names:
         sd = fit.sd[names.index("gamma")] / M
-        if not sd <= GAIN_SD or fit.freedom < LEAST_FREEDOM:
-            return "gamma", (
-                f"standard error {sd:.2g}, more than {GAIN_SD:g}: the accelerometer's gain cannot be told here; pitch of 1 to 2 % "
-                "would be in c_b and kappa_2"
-            )
+        left = "the accelerometer's gain cannot be told here; pitch of 1 to 2 % would be in c_b and kappa_2"
+        if fit.freedom < LEAST_FREEDOM:
+            return "gamma", f"too short: {_stretches(fit)}; {left}"
+        if not sd <= GAIN_SD:
+            return "gamma", f"standard error {sd:.2g}, more than {GAIN_SD:g}: {left}"
     if "kappa_2" in names:
         k = names.index("kappa_2")
         value, sd = float(fit.solution[k]), float(fit.sd[k])
-        if not sd <= DRAG_SD * abs(value) or fit.freedom < LEAST_FREEDOM:
+        if fit.freedom < LEAST_FREEDOM:
+            return "kappa_2", f"too short: {_stretches(fit)}"
+        if not sd <= DRAG_SD * abs(value):
             return (
                 "kappa_2",
                 f"{value:.3g} kg/m with a standard error of {sd:.2g}: too few different speeds to tell drag from kappa_1",
             )
     return "", ""
+
+
+def _stretches(fit: Regression) -> str:
+    """How many blocks count, and how many should."""
+    needed = fit.blocks - fit.freedom + LEAST_FREEDOM
+    return f"{fit.blocks} stretches that do not resemble one another count, and {needed} are needed"
 
 
 def _told_apart(X: Array, names: list[str]) -> tuple[str, str] | None:
@@ -240,15 +252,16 @@ def _refuse_values(found: Mapping[str, Coefficient], fit: Regression, M: float, 
     if (c := found.get("c_b")) is not None and (c.value <= 0 or c.sd > BRAKE_SD * c.value):
         why = "not positive: is the pressure's sign right?" if c.value <= 0 else "too little braking"
         refused.append(Refusal("c_b", f"{c.value:.3g} N/Pa with a standard error of {c.sd:.2g}: {why}"))
+    elif c is not None and not BRAKE_PER_MASS[0] <= c.value / M <= BRAKE_PER_MASS[1]:
+        refused.append(Refusal(
+            "c_b", f"{c.value:.3g} N/Pa, where {BRAKE_PER_MASS[0] * M:.2g} to {BRAKE_PER_MASS[1] * M:.2g} can be for {M:.0f} kg: "
+            "the unit of brake_pressure is suspect",
+        ))  # fmt: skip
     k1 = found["kappa_1"]
     if k1.sd > max(OFFSET_SD * M, 0.25 * abs(k1.value)):
         refused.append(Refusal("kappa_1", f"{k1.value:.3g} N with a standard error of {k1.sd:.2g}"))
     elif "kappa_2" not in names:
         refused.append(Refusal("kappa_1", "it cannot be told from the drag at these speeds"))
-    if (k2 := found.get("kappa_2")) is not None and k2.value < 0:
-        refused.append(
-            Refusal("kappa_2", f"{k2.value:.3g} kg/m is negative: a wrong mass, tau, or unit of torque or speed?")
-        )
     return refused
 
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from codriver.finding import Finding
 from codriver.identify.brake_rows import DriveRows
+from codriver.identify.brake_verdict import refuse_condemned
 from codriver.identify.learning import LearningPoint
+from codriver.identify.plausible import within_file_bounds
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
 from codriver.vehicles import Vehicle
@@ -66,6 +69,8 @@ class BrakeFit:
         rows, model: filtered signals, and a_ID on all ticks, m/s^2.
         fitted, validated: ticks of the halves, the first without its outliers.
         lags, correlation: autocorrelation of the residuals, s and 1.
+        mass: M, kg.
+        remarks: what gears, sensors and the old vehicle say of the fit.
         sources: of the logs.
     """
 
@@ -91,14 +96,22 @@ class BrakeFit:
     validated: Flags = field(repr=False)
     lags: Array = field(repr=False)
     correlation: Array = field(repr=False)
+    mass: float
+    remarks: tuple[Finding, ...] = ()
     sources: tuple[str, ...] = ()
 
     def vehicle(self, old: Vehicle) -> Vehicle:
-        """The old vehicle with the coefficients that were found; refused ones keep their old value, if any."""
+        """The old vehicle with the coefficients that were found; refused ones keep their old value, if any.
+
+        Raises:
+            LogError: the fit is condemned by its own verdict, `codriver.identify.brake_verdict`.
+        """
+        refuse_condemned(self)
         new = old
         for letter, name in PARAMETERS.items():
             # A negative kappa_1 is a bias and no resistance; no vehicle file takes it.
             if (found := self.coefficients.get(letter)) is not None and found.value >= 0:
+                within_file_bounds(name, [found.value], "a unit of the log's signals, or the vehicle's mass")
                 new = new.with_parameter(name, found.value, found.sd_total, self._source(letter, found))
         return new
 

@@ -22,11 +22,12 @@ import numpy as np
 from codriver.errors import LogError
 from codriver.finding import Finding
 from codriver.identify.brake_rows import DriveRows, drive_rows
+from codriver.identify.gear_by_engine import EFFICIENCY, engine_turns, wrong_gears
 from codriver.identify.pedal import SIGNALS as PEDAL_SIGNALS
 from codriver.identify.pedal import pedal_rows
-from codriver.identify.ratio import engine_turns
 from codriver.identify.regression import solve, trimmed_rows
 from codriver.identify.standard_errors import newey_west
+from codriver.sensors_agree import sensors_agree
 from codriver.signals import Log
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
@@ -35,7 +36,6 @@ from codriver.vehicles import Vehicle
 DT = 0.02  # s; for factors, not for per cents
 ALIKE = 2.0  # s over which residuals are taken to be alike
 WARN, BAD = 0.12, 0.3  # of the natural logarithm of a quotient that should be 1
-EFFICIENCY = (0.8, 1.02)
 CLEAR = 4.0  # standard errors
 LEAST_SECONDS = 10.0
 UNEVEN = 1.2  # s of one gear over that of another
@@ -57,7 +57,9 @@ def check_vehicle_against_log(log: Log, vehicle: Vehicle) -> tuple[Finding, ...]
     Returns:
         Findings, the worst first; one of severity "ok" for each parameter that fits, none for what cannot be judged.
     """
-    found = [*_pedal(log, vehicle), *_motion(log, vehicle)]
+    sensors = [f for f in sensors_agree(log) if f.severity == "bad"] if "mass" in vehicle else []
+    # Forces held against an accelerometer that is wrong would blame mass, tau and torque.
+    found = [*sensors, *_pedal(log, vehicle), *([] if sensors else _motion(log, vehicle))]
     return tuple(sorted(found, key=lambda finding: ("bad", "warn", "ok").index(finding.severity)))
 
 
@@ -109,6 +111,8 @@ def _engine(logs: Sequence[Log], rows: DriveRows, taus: tuple[float, ...]) -> li
         return [Finding("bad", f"{'; '.join(wrong)}: tau should be 0.8 to 1 times it; {cure}")]
     if not turns:
         return []
+    if often := wrong_gears(logs, rows, taus):
+        return often
     shares = [taus[gear - 1] / here for gear, here in turns.items()]
     return [
         Finding(

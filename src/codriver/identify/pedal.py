@@ -14,17 +14,20 @@ T_r is no multiple of p_r.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from codriver.errors import LogError
 from codriver.finding import Finding
 from codriver.identify.brake_rows import halves, short_name
+from codriver.identify.brake_verdict import HARDLY
 from codriver.identify.low_pass import centred, low_pass, rate
+from codriver.identify.plausible import far_from_old, within_file_bounds
 from codriver.identify.regression import regress, rms, solve
 from codriver.identify.sound import refuse_unsound
 from codriver.identify.usable import AFTER_SHIFT, BEFORE_SHIFT, OPEN_CLUTCH, filled, inside, widened
+from codriver.sensors_agree import sensors_agree
 from codriver.signals import Grid, Log
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
@@ -95,7 +98,18 @@ class PedalFit:
     sources: tuple[str, ...] = ()
 
     def vehicle(self, old: Vehicle) -> Vehicle:
-        """The old vehicle with this c_r."""
+        """The old vehicle with this c_r.
+
+        Raises:
+            LogError: it explains the validation half hardly better than a constant, or no vehicle has such a c_r.
+        """
+        if not self.rmse < HARDLY * self.rmse_constant:
+            raise LogError(
+                f"{', '.join(self.sources)}: validation RMSE {self.rmse:.3g} N m, and {self.rmse_constant:.3g} for a constant",
+                "a request that follows the pedal in both halves of the drive",
+                "check pedal and request; nothing was written",
+            )
+        within_file_bounds("pedal_coefficient", [self.c_r], "the unit of accelerator_pedal or of engine_torque_request")
         text = (
             f"c_r identified from {', '.join(self.sources)}; 2017 eq. (8b), {self.minutes_fit:.1f} usable minutes, R2 "
             f"{self.r2:.4f}, validation RMSE {self.rmse:.3g} N m on another {self.minutes_validation:.1f}"
@@ -120,6 +134,7 @@ def identify_pedal(
     """
     logs = [logs] if isinstance(logs, Log) else list(logs)
     refuse_unsound(logs, SIGNALS)
+    odd = [f for log in logs for f in sensors_agree(log) if f.severity == "bad"]
     parts = [pedal_rows(log, dt) for log in logs]
     pedal, request = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
     keep = np.concatenate([part[2] for part in parts])
@@ -145,9 +160,15 @@ def identify_pedal(
     old = vehicle.number("pedal_coefficient") if vehicle is not None and "pedal_coefficient" in vehicle else None
     e = request - c_r * pedal
     half = fit.interval_factor * sd
+    findings = [*_findings(c_r, r2, offset, curvature, fit.trimmed), *(replace(
+        f, severity="warn", text=f"{f.text}; c_r does not need it, brake and ratio do"
+    ) for f in odd)]  # fmt: skip
+    if vehicle is not None:
+        cause = "the unit of the pedal or of the request is wrong, or it is another driving mode"
+        findings += far_from_old("c_r", c_r, sd, vehicle, "pedal_coefficient", cause)
     return PedalFit(
         c_r, sd, float(fit.sd_hac[0]), c_r - half, c_r + half, r2, offset, curvature,
-        _findings(c_r, r2, offset, curvature, fit.trimmed), rms(e[second]),
+        tuple(findings), rms(e[second]),
         None if old is None else rms((request - old * pedal)[second]),
         rms(request[second] - request[first].mean()), float(first.sum()) * dt / 60, float(second.sum()) * dt / 60, share,
         float(keep.mean()), fit.trimmed, fit.length * dt, fit.blocks, pedal, request, first, second,

@@ -25,11 +25,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from codriver.errors import LogError, UsageError
+from codriver.finding import Finding
 from codriver.identify.brake_rows import SIGNALS, DriveRows, drive_rows, short_name
+from codriver.identify.gear_by_engine import MOST_WRONG, STANDS, engine_turns, turns
+from codriver.identify.ratio_verdict import refuse_condemned
 from codriver.identify.regression import Regression, regress, rms, solve
 from codriver.identify.sound import refuse_unsound
 from codriver.signals import Log
-from codriver.signals.signal import Array
 
 if TYPE_CHECKING:
     from codriver.vehicles import Vehicle
@@ -40,6 +42,7 @@ RATIO_SD = 0.1  # greatest standard error, as a share of the ratio
 LEAST_FREEDOM = 3
 SPEED_RANGE = 100.0  # m^2/s^2, standard deviation of v^2: below it drag cannot be told from k_1
 MOST_GEARS = 12
+ONE_GEAR = 0.1  # share by which engine speed over speed may differ within a gear
 GAIN_SD = 0.02  # greatest standard error of gamma, for it to be used
 LEAST_SLOPE = 0.1  # m/s^2, RMS of dv/dt that the other columns do not make up; wheel noise alone makes some 0.05
 
@@ -77,6 +80,9 @@ class RatioFit:
         block: s, length of a block of the bootstrap; `blocks` how many.
         interval_factor: half the width of a 95 % interval in standard errors.
         gain: gamma, the accelerometer's gain error, and its standard error; None where the road is too level to tell.
+        trimmed: share of the moments left out as outliers.
+        constant: RMS about the mean of [y1]_F, m/s^2.
+        remarks, wrong_gears: what is to say about the sensors, and about the log's gear beside the engine's speed.
         sources: of the logs.
     """
 
@@ -90,6 +96,10 @@ class RatioFit:
     blocks: int
     interval_factor: float
     gain: tuple[float, float] | None
+    trimmed: float
+    constant: float
+    remarks: tuple[Finding, ...] = ()
+    wrong_gears: tuple[Finding, ...] = ()
     sources: tuple[str, ...] = ()
 
     @property
@@ -111,8 +121,10 @@ class RatioFit:
 
         Raises:
             VehicleError: it has no mass.
-            LogError: a gear below the highest one found could not be told, and the vehicle has no value for it.
+            LogError: the ratios are condemned (`codriver.identify.ratio_verdict`), or a
+                gear below the highest one found could not be told, and the vehicle has no value for it.
         """
+        refuse_condemned(self, old)
         M, sd_mass = old.number("mass"), old.parameters["mass"].sd
         known = old.numbers("transmission") if "transmission" in old else ()
         was = old.parameters["transmission"].sd if known else None
@@ -163,7 +175,7 @@ def identify_ratio(logs: Log | Sequence[Log], *, dt: float = 0.01, seed: int = 0
         LogError: the drives do not excite the ratio of any gear: too short, or the torque hardly changes.
     """
     logs = [logs] if isinstance(logs, Log) else list(logs)
-    refuse_unsound(logs, SIGNALS[:-1])
+    odd = refuse_unsound(logs, SIGNALS[:-1])
     highest = max((float(np.nanmax(log["gear"].values, initial=1)) for log in logs if "gear" in log), default=1.0)
     count = int(min(max(highest, 1), MOST_GEARS))
     rows = drive_rows(logs, count, dt, known_gears=True, pressure=False, without_braking=True)
@@ -189,20 +201,43 @@ def identify_ratio(logs: Log | Sequence[Log], *, dt: float = 0.01, seed: int = 0
     found = []
     for k, gear in enumerate(driven):
         ratio, sd, hac = float(fit.solution[k]), float(fit.sd[k]), float(fit.sd_hac[k])
-        if sd <= RATIO_SD * ratio:
+        if ratio < -2 * sd:
+            refused[gear] = (
+                f"{ratio:.3g} 1/(kg m) is negative: the sign of engine_torque is wrong (or of the accelerometer and the speed)"
+            )
+        elif sd <= RATIO_SD * ratio:
             found.append(GearRatio(gear, ratio, sd, hac, float((fit.used & (rows.gear == gear)).sum() * dt)))
         else:
             refused[gear] = f"{ratio:.3g} 1/(kg m) with a standard error of {sd:.2g}: the torque varies too little"
     if not found:
         raise LogError(
             f"{names}: " + "; ".join(f"gear {gear}: {why}" for gear, why in refused.items()),
-            f"a standard error of at most {RATIO_SD:.0%} of the ratio",
-            "record a longer drive with stronger and weaker accelerations",
+            f"positive ratios with a standard error of at most {RATIO_SD:.0%}",
+            "mend a sign in the names file (sign = -1), or record a longer drive with stronger and weaker accelerations",
         )
     return RatioFit(
         tuple(found), refused, fit.residual, float(fit.used.sum() * dt), rows.share, engine_turns(logs, rows, count),
-        fit.length * dt, fit.blocks, fit.interval_factor, gain, tuple(short_name(log) for log in logs),
+        fit.length * dt, fit.blocks, fit.interval_factor, gain, fit.trimmed,
+        float(rows.y[fit.used].std()), (*odd, *rows.clipped), tuple(_wrong(logs, rows, found)),
+        tuple(short_name(log) for log in logs),
     )  # fmt: skip
+
+
+def _wrong(logs: Sequence[Log], rows: DriveRows, found: Sequence[GearRatio]) -> list[Finding]:
+    """Whether the log's gear is stuck or late: engine speed over speed differs within a gear, whatever tau is."""
+    spread = []
+    here = turns(logs, rows)
+    for g in found:
+        there = rows.keep & (rows.gear == g.gear) & (here > STANDS)
+        if there.sum() * rows.dt >= LEAST_SECONDS:
+            off = float((np.abs(here[there] / np.median(here[there]) - 1) > ONE_GEAR).mean())
+            spread += [f"gear {g.gear} {off:.0%}"] if off > MOST_WRONG else []
+    if not spread:
+        return []
+    said = (
+        f"engine speed over speed is not one number within a gear of the log (moments that differ: {', '.join(spread)})"
+    )
+    return [Finding("bad", f"{said}: is the gear stuck or late?")]
 
 
 def _fit(rows: DriveRows, driven: list[int], seed: int, names: str) -> tuple[Regression, tuple[float, float] | None]:
@@ -232,25 +267,3 @@ def _fit(rows: DriveRows, driven: list[int], seed: int, names: str) -> tuple[Reg
             "record a longer drive, or give several logs",
         )
     return fit, None
-
-
-def engine_turns(logs: Sequence[Log], rows: DriveRows, gears: int) -> dict[int, float]:
-    """omega / v by gear, 1/m, the median over usable ticks; empty where a log has no engine speed."""
-    if not all("engine_speed" in log for log in logs):
-        return {}
-    parts = []
-    for number, log in enumerate(logs):
-        time: Array = rows.time[rows.pieces[number] : rows.pieces[number + 1]]
-        grid = log.sample(["engine_speed", "longitudinal_speed"], rows.dt, start=float(time[0]), stop=float(time[-1]))
-        held = grid.held["engine_speed"] & grid.held["longitudinal_speed"]
-        v = grid.values["longitudinal_speed"]
-        quotient = np.where(held & (v > 1.0), grid.values["engine_speed"] / np.where(v > 1.0, v, 1.0), np.nan)
-        parts.append(np.resize(quotient, time.size) if quotient.size != time.size else quotient)
-    turns = np.concatenate(parts)
-    found = {}
-    for gear in range(1, gears + 1):
-        there = rows.keep & (rows.gear == gear) & np.isfinite(turns)
-        # An engine that does not turn while the car moves is a signal that is not there.
-        if there.sum() * rows.dt >= 1.0 and abs(here := float(np.median(turns[there]))) > 0.01:
-            found[gear] = here
-    return found

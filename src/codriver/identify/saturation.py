@@ -85,8 +85,8 @@ def told(found: Iterable[Plateau], source: str) -> list[Finding]:
         unit, factor = _UNITS.get(one.name, ("N m", 1.0))
         full = ", or the engine at full load" if one.name == "engine_torque" else ""
         said.append(Finding(
-            "warn", f"{source}: {one.name} stays at {one.value * factor:.4g} {unit}, its {'least' if one.value < 0 else 'greatest'} "
-            f"value, {one.count} times for {one.seconds:.3g} s in all: cut off at the end of its range{full}; these moments are left "
-            "out",
+            "warn", f"{source}: {one.name} stays at {one.value * factor:.4g} {unit}, its {'least' if one.value < 0 else 'greatest'}"
+            f" value, {one.count} times for {one.seconds:.3g} s in all: cut off at the end of its range{full}; these moments are "
+            "left out",
         ))  # fmt: skip
     return said

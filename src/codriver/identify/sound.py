@@ -10,10 +10,12 @@ Least squares finds numbers in any signals. What no fit can show afterwards is l
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from codriver.errors import LogError
+from codriver.finding import Finding
 from codriver.identify.brake_rows import short_name
 from codriver.names import VOCABULARY
 from codriver.sensors_agree import pedals_move, sensors_agree
@@ -25,22 +27,27 @@ LEAST_SECONDS = 5.0  # below it a signal may well stay the same
 RESTS = ("longitudinal_speed", "brake_pressure")  # a car that stands, a brake that is not used: said elsewhere
 
 
-def refuse_unsound(logs: Sequence[Log], needed: Sequence[str]) -> None:
+def refuse_unsound(logs: Sequence[Log], needed: Sequence[str]) -> list[Finding]:
     """Refuse drives whose signals cannot be right.
 
     Args:
         logs: the drives.
         needed: signals that the identification uses; the accelerometer is held against the speed if it is among them.
 
+    Returns:
+        Warnings of what is odd, and may be right.
+
     Raises:
         MissingSignal: a log lacks a signal.
         LogError: its signals cannot be right; the message names the signal and the likely cause.
     """
+    odd = []
     for log in logs:
         for name in needed:
             _signal(log, name)
         if "longitudinal_acceleration" in needed:
-            _motion(log, needed)
+            odd += _motion(log, needed)
+    return odd
 
 
 def _signal(log: Log, name: str) -> None:
@@ -53,7 +60,7 @@ def _signal(log: Log, name: str) -> None:
             "minutes of driving, with stamps that increase",
             "record a longer drive, or see with `codriver info LOG` what it holds",
         )
-    if s.rate < LEAST_RATE:
+    if s.rate < 0.9 * LEAST_RATE:  # clocks are not exact
         raise LogError(
             f"{short_name(log)}: {name} comes {s.rate:.3g} times a second, which is too slow for signals low-passed at 5 Hz",
             f"at least {LEAST_RATE:g} a second, {GOOD_RATE:g} or more are better",
@@ -67,9 +74,10 @@ def _signal(log: Log, name: str) -> None:
         )
 
 
-def _motion(log: Log, needed: Sequence[str]) -> None:
-    """Raises LogError where accelerometer, speed and pressure do not go together."""
-    wrong = [finding.text for finding in sensors_agree(log) if finding.severity == "bad"]
+def _motion(log: Log, needed: Sequence[str]) -> list[Finding]:
+    """Warnings; raises LogError where accelerometer, speed and pressure do not go together."""
+    motion = sensors_agree(log)
+    wrong = [finding.text for finding in motion if finding.severity == "bad"]
     if wrong:
         raise LogError(
             f"{short_name(log)}: {wrong[0]}",
@@ -79,3 +87,6 @@ def _motion(log: Log, needed: Sequence[str]) -> None:
     wrong = [finding.text for finding in pedals_move(log, {"brake_pressure"})] if "brake_pressure" in needed else []
     if wrong:
         raise LogError(f"{short_name(log)}: {wrong[0]}", "the master cylinder's pressure", "mend the names file")
+    return [
+        replace(finding, text=f"{short_name(log)}: {finding.text}") for finding in motion if finding.severity == "warn"
+    ]

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from codriver.identify import BrakeFit, GearRatio, PedalFit, RatioFit
-from codriver.identify.brake import ODD_GAIN
 from codriver.identify.brake_fit import PARAMETERS
+from codriver.identify.brake_verdict import brake_findings
 from codriver.identify.pedal import REASONS as PEDAL_REASONS
+from codriver.identify.ratio_verdict import ratio_findings
 from codriver.identify.usable import REASONS
 from codriver.report.document import Chart, Curve, Document, Findings, Mark, Plot, Section, Span, Table
 from codriver.signals.grid import Flags
@@ -58,42 +59,6 @@ def ratio_rows(fit: RatioFit, old: Vehicle | None) -> list[Row]:
     return rows
 
 
-def brake_findings(fit: BrakeFit) -> list[tuple[str, str]]:
-    """What is to say about the fit, the worst first: severity and sentence."""
-    said = [("bad", f"{r.name} is refused: {r.reason}") for r in fit.refused if r.name != "gamma"]
-    said += [("warn", f"gamma is left out: {r.reason}") for r in fit.refused if r.name == "gamma"]
-    gamma = fit.coefficients.get("gamma")
-    if gamma is not None and abs(gamma.value) > ODD_GAIN:
-        said.append((
-            "bad", f"the accelerometer's gain error comes out as {gamma.value:.1%}, which is no pitch: mass or tau of the vehicle "
-            "file is wrong, or the scale of accelerometer or speed; c_b goes with tau",
-        ))  # fmt: skip
-    for found in fit.coefficients.values():
-        if not 0.5 < found.sd_hac / found.sd < 2.0:
-            said.append((
-                "warn", f"{found.name}: the two standard errors differ, {found.sd:.3g} (bootstrap) and {found.sd_hac:.3g} "
-                f"(Newey-West) {found.unit}: a few moments decide; a longer drive would help",
-            ))  # fmt: skip
-    kappa_1 = fit.coefficients.get("kappa_1")
-    if kappa_1 is not None and kappa_1.value < 0:
-        said.append(
-            (
-                "warn",
-                "kappa_1 - M d_a is negative: the accelerometer's bias is larger than the rolling resistance; not written",
-            )
-        )
-    if fit.trimmed > 0.02:
-        said.append(("warn", f"{fit.trimmed:.1%} of the moments do not fit and were left out as outliers"))
-    if fit.rmse_old is not None and fit.rmse > 1.05 * fit.rmse_old:
-        said.append(("bad", "the old coefficients fit the validation half better: keep them, or record a longer drive"))
-    elif fit.rmse < 0.5 * fit.rmse_constant:
-        said.append(("ok", "the coefficients explain the half of the data that they were not fitted to"))
-    else:
-        said.append(("warn", "the validation half is hardly explained: check units, mass and gear of the log"))
-    order = ("bad", "warn", "ok")
-    return sorted(said, key=lambda one: order.index(one[0]))
-
-
 def brake_document(fit: BrakeFit, old: Vehicle, command: str = "") -> Document:
     """The report of `identify_brake`."""
     before = "-" if fit.rmse_old is None else f"{fit.rmse_old:.4f}"
@@ -110,7 +75,7 @@ def brake_document(fit: BrakeFit, old: Vehicle, command: str = "") -> Document:
             Section("Result", (
                 Table(HEAD, tuple(brake_rows(fit, old)),
                       "sd and interval hold the standard deviations of M and tau, where the vehicle has them."),
-                Findings(tuple(brake_findings(fit))), quality,
+                Findings(tuple((f.severity, f.text) for f in brake_findings(fit))), quality,
                 "Without a known bias, kappa_1 cannot be told from the accelerometer's bias d_a: what is found is kappa_1 - M d_a. "
                 "gamma is how much more acceleration the sensor shows than the wheels, mostly the pitch of the body.",
             )),
@@ -171,7 +136,11 @@ def ratio_document(fit: RatioFit, old: Vehicle | None, command: str = "") -> Doc
     )
     parts: tuple[str | Table | Findings, ...] = (
         Table(HEAD, tuple(ratio_rows(fit, old)), "tau is the ratio times M."),
-        Findings(tuple(("warn", f"gear {gear} is refused: {why}") for gear, why in fit.refused.items())),
+        Findings(
+            tuple((f.severity, f.text) for f in ratio_findings(fit, old))
+            if M is not None and old is not None
+            else tuple(("warn", f"gear {gear} is refused: {why}") for gear, why in fit.refused.items())
+        ),
         f"RMS of the fit {fit.residual:.4f} m/s² on {fit.seconds / 60:.1f} min with the brake released.",
         "The accelerometer's gain error, mostly pitch, cannot be told on roads so level: it is in the ratios."
         if fit.gain is None
