@@ -90,7 +90,7 @@ def choose_model(rows: Rows, guess: tuple[float, float] | None, asked: Asked) ->
 
 def _grown(rows: Rows, best: Best, ticks: int, asked: Asked) -> tuple[Best, int]:
     """The fit with all that is wanted, and the delay in ticks."""
-    price = float(np.log(max(best.run.counts.sum(), 2))) / 2
+    price = float(np.log(max(float(best.run.counts.sum()), 2.0))) / 2
     for _ in range(ROUNDS):
         before = best.run.log_likelihood
         late = _late(rows, ticks)

@@ -137,7 +137,7 @@ def _torque(fit: SteeringFit) -> Chart:
 
 def _correlation(fit: SteeringFit) -> Chart:
     """Autocorrelation of the innovations."""
-    limit = 1.96 / np.sqrt(max(fit.best.run.counts.sum(), 1))
+    limit = 1.96 / np.sqrt(max(float(fit.best.run.counts.sum()), 1.0))
     return Chart(
         "Autocorrelation of the innovations", "lag (s)",
         (Plot("correlation", (Curve("normalised innovations", fit.lags[1:], fit.correlation[1:], kind="bars"),), 180,
