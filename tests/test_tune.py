@@ -127,6 +127,23 @@ def test_noise_is_found_again():
     assert fit.found.factor == pytest.approx(4e-4, rel=0.05)
 
 
+@pytest.mark.slow
+def test_standard_errors_hold_from_ten_blocks_on(monkeypatch):
+    """Drives drawn from the model: 1.96 standard errors hold the truth from 100 s on, and from 20 s they do not."""
+    monkeypatch.setattr("codriver.tune.noise.LEAST_BLOCKS", 1)
+    true = cd.Preset((1e-4, 1e-4, 1.0, 20.0), (1.0, 0.05), 2.0, "made up")
+    values = {"Q of the offset": 1.0, "Q of the jerk": 20.0, "R of the speed": 0.05}
+    program, share = cd.compile(cd.build("kinematic", dt=DT, ell=2.0)), {}
+    for seconds in (22, 102):
+        held = []
+        for seed in range(30):
+            fit = fit_noise(Likelihood([program.run(drawn_log(true, 2.0, seconds, 1000 + seed))]), PAPER, "own", "test")
+            held += [abs(np.log(r.found / values[r.name])) < 1.96 * r.spread for r in fit.ratios if r.name in values]
+        share[seconds] = np.mean(held)
+    assert share[22] < 0.85
+    assert share[102] > 0.88
+
+
 def test_it_never_gets_worse():
     """Begun at the truth, the result is at least as likely."""
     one = Likelihood([run(drawn_log(PAPER, 2.0, 60, 7))])

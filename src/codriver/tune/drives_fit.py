@@ -65,9 +65,11 @@ def refuse_short(likelihood: Likelihood) -> None:
     Raises:
         LogError: too few.
     """
-    if likelihood.blocks < LEAST_BLOCKS:
+    blocks = likelihood.blocks
+    if blocks < LEAST_BLOCKS:
         raise LogError(
-            f"{likelihood.seconds:.0f} s that count, {likelihood.blocks} block{'s' * (likelihood.blocks != 1)} of {BLOCK:g} s: too few to say how sure Q, R are",
+            f"{likelihood.seconds:.0f} s that count, {blocks} block{'s' * (blocks != 1)} of {BLOCK:g} s: too few to say how "
+            "sure Q and R are",
             f"at least {LEAST_BLOCKS} blocks, {LEAST_BLOCKS * BLOCK:g} s of moving with all inputs, between gear shifts",
             "give longer drives or more of them, or choose ell alone (--delay without --likelihood)",
         )  # fmt: skip
