@@ -17,11 +17,12 @@ import codriver as cd
 from codriver.cli import main
 from codriver.errors import LogError, MissingSignal, UsageError
 from codriver.identify import check_vehicle_against_log, identify_brake, identify_pedal, identify_ratio
+from codriver.identify.brake import _badly_told
 from codriver.identify.brake_rows import drive_rows, halves
 from codriver.identify.brake_verdict import brake_findings
 from codriver.identify.low_pass import centred, low_pass, rate, smooth
 from codriver.identify.ratio_verdict import ratio_findings
-from codriver.identify.regression import regress, solve, trimmed_rows
+from codriver.identify.regression import Regression, regress, solve, trimmed_rows
 from codriver.identify.standard_errors import (
     autocorrelation,
     block_bootstrap,
@@ -568,8 +569,10 @@ class TestUnsound:
     def test_pressure_stuck_or_in_bar(self, demo, car):
         with pytest.raises(LogError, match="brake_pressure is 5e"):
             identify_brake(changed(demo.measured, "brake_pressure", lambda p: 0 * p + 5e5), car)
-        with pytest.raises(LogError, match="is its unit right"):
-            identify_brake(changed(demo.measured, "brake_pressure", lambda p: 1e-5 * p), car)
+        in_bar = changed(demo.measured, "brake_pressure", lambda p: 1e-5 * p)
+        for identify in (lambda: identify_brake(in_bar, car), lambda: identify_ratio(in_bar)):
+            with pytest.raises(LogError, match="is its unit right"):
+                identify()
 
     def test_slow_samples(self, demo, car):
         slow = demo.measured.with_signals(*(
@@ -661,11 +664,22 @@ class TestVerdict:
         assert found.coefficients.get("c_b") is None
         assert any("unit of brake_pressure is suspect" in r.reason for r in found.refused)
 
-    def test_too_short_is_the_reason_told(self, car):
-        found = identify_brake(synthetic(16, seed=3), car)
-        for refusal in found.refused:
-            if refusal.name in ("gamma", "kappa_2") and "more than" in refusal.reason:
-                assert float(re.search(r"error (\S+),", refusal.reason)[1]) > 0.02
+    def test_too_short_is_the_reason_told(self):
+        """Not a standard error that is small enough."""
+        few = Regression(
+            np.array([C_B, 0.1]), np.array([1e-6, 0.0078 * M]), np.zeros(2), 2, np.ones(1, bool), 0.0, 0.1, 100, 4
+        )
+        name, reason = _badly_told(few, ["c_b", "gamma"], M)
+        assert name == "gamma"
+        assert "too short: 4 stretches" in reason
+        assert "6 are needed" in reason
+        assert "standard error" not in reason
+        assert _badly_told(replace(few, freedom=50), ["c_b", "gamma"], M) == ("", "")
+
+    def test_one_passenger_too_few_is_told_and_written(self, road, car):
+        found = identify_brake(road, car.with_parameter("mass", 1.05 * M, source="with a passenger"))
+        assert any("is the mass that of the drive" in f.text for f in brake_findings(found) if f.severity == "warn")
+        assert found.vehicle(car).number("brake_coefficient") == pytest.approx(C_B, rel=0.005)
 
     @pytest.mark.parametrize("bias", [float("nan"), 500.0, -3.0])
     def test_bias_that_is_none(self, car, bias):

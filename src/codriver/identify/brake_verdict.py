@@ -26,7 +26,7 @@ from codriver.vehicles import Vehicle
 if TYPE_CHECKING:
     from codriver.identify.brake_fit import BrakeFit
 
-ODD_GAIN = 0.06  # gamma beyond it is no pitch: mass, tau or a sensor's scale
+ODD_GAIN, WRONG_GAIN = 0.06, 0.1  # gamma beyond them is no pitch alone (5 % of M are enough), and is no pitch at all
 EXPLAINS, HARDLY = 0.5, 0.9  # of the RMSE of a constant
 WORSE = 1.05  # times the old coefficients' RMSE
 SOME_OUTLIERS, MANY_OUTLIERS = 0.02, 0.08
@@ -48,7 +48,12 @@ def brake_findings(fit: BrakeFit) -> list[Finding]:
                 "warn", f"{found.name}: the two standard errors differ, {found.sd:.3g} (bootstrap) and {found.sd_hac:.3g} "
                 f"(Newey-West) {found.unit}: a few moments decide; a longer drive would help",
             ))  # fmt: skip
-    kappa_1 = fit.coefficients.get("kappa_1")
+    gamma, kappa_1 = (fit.coefficients.get(name) for name in ("gamma", "kappa_1"))
+    if gamma is not None and ODD_GAIN < abs(gamma.value) <= WRONG_GAIN:
+        said.append(Finding(
+            "warn", f"the accelerometer's gain error comes out as {gamma.value:.1%}, where pitch makes 1 to 2 %: is the mass that of "
+            "the drive? c_b is hardly touched, kappa_1 and kappa_2 are",
+        ))  # fmt: skip
     if kappa_1 is not None and kappa_1.value < 0:
         said.append(Finding(
             "warn", "kappa_1 - M d_a is negative: the accelerometer's bias is larger than the rolling resistance; not written"
@@ -78,7 +83,7 @@ def condemned(fit: BrakeFit) -> list[Finding]:
             "bad", "the old coefficients fit the validation half better: keep them, or record a longer drive"
         ))  # fmt: skip
     gamma = fit.coefficients.get("gamma")
-    if gamma is not None and abs(gamma.value) > ODD_GAIN:
+    if gamma is not None and abs(gamma.value) > WRONG_GAIN:
         said.append(Finding(
             "bad", f"the accelerometer's gain error comes out as {gamma.value:.1%}, which is no pitch: mass or tau of the vehicle "
             "file is wrong, or the scale of torque, accelerometer or speed; c_b goes with tau",

@@ -46,7 +46,7 @@ def refuse_unsound(logs: Sequence[Log], needed: Sequence[str]) -> list[Finding]:
         for name in needed:
             _signal(log, name)
         if "longitudinal_acceleration" in needed:
-            odd += _motion(log, needed)
+            odd += _motion(log)
     return odd
 
 
@@ -74,7 +74,7 @@ def _signal(log: Log, name: str) -> None:
         )
 
 
-def _motion(log: Log, needed: Sequence[str]) -> list[Finding]:
+def _motion(log: Log) -> list[Finding]:
     """Warnings; raises LogError where accelerometer, speed and pressure do not go together."""
     motion = sensors_agree(log)
     wrong = [finding.text for finding in motion if finding.severity == "bad"]
@@ -84,7 +84,7 @@ def _motion(log: Log, needed: Sequence[str]) -> list[Finding]:
             "an accelerometer (longitudinal_acceleration) that shows the change of longitudinal_speed",
             "check unit and sign of both in the names file; `codriver check names FILE` shows them",
         )
-    wrong = [finding.text for finding in pedals_move(log, {"brake_pressure"})] if "brake_pressure" in needed else []
+    wrong = [finding.text for finding in pedals_move(log, {"brake_pressure"})]  # a ratio leaves braking out by it
     if wrong:
         raise LogError(f"{short_name(log)}: {wrong[0]}", "the master cylinder's pressure", "mend the names file")
     return [
