@@ -51,8 +51,8 @@ def brake_findings(fit: BrakeFit) -> list[Finding]:
     gamma, kappa_1 = (fit.coefficients.get(name) for name in ("gamma", "kappa_1"))
     if gamma is not None and ODD_GAIN < abs(gamma.value) <= WRONG_GAIN:
         said.append(Finding(
-            "warn", f"the accelerometer's gain error comes out as {gamma.value:.1%}, where pitch makes 1 to 2 %: is the mass that of "
-            "the drive? c_b is hardly touched, kappa_1 and kappa_2 are",
+            "warn", f"the accelerometer's gain error comes out as {gamma.value:.1%}, where pitch makes 1 to 2 %: is the mass that "
+            "of the drive? c_b is hardly touched, kappa_1 and kappa_2 are",
         ))  # fmt: skip
     if kappa_1 is not None and kappa_1.value < 0:
         said.append(Finding(
