@@ -343,7 +343,7 @@ def test_standard_errors_need_blocks(demo):
     assert one.blocks < LEAST_BLOCKS
     assert one.profile.spread == np.inf
     said = " ".join(part for s in tuning_document(one).sections for part in s.parts if isinstance(part, str))
-    assert f"{one.blocks} blocks of 10 s count, 10 are needed" in said
+    assert f"too few blocks of 10 s count ({one.blocks}, 10 are needed)" in said
     # The band of the preset begun with is too narrow for it, which no wrong sensor is the cause of: at a larger ell it fits.
     assert not run(short).check().trusted
     assert run(short, one.profile.best).check().trusted

@@ -212,7 +212,9 @@ def _say(result: Tuning, told: dict[str, Any]) -> None:
             out.print(f"  {r.name:<22} {r.start:.3g} -> {said}")
     out.print(f"\nat the Q and R of {result.begun.name} the rows are most likely for ell = {result.profile.best:.3g}")
     if result.blocks < LEAST_BLOCKS:
-        out.print(f"how sure that is cannot be said: {result.blocks} blocks of 10 s count, {LEAST_BLOCKS} are needed")
+        out.print(
+            f"how sure that is cannot be said: too few blocks of 10 s count ({result.blocks}, {LEAST_BLOCKS} are needed)"
+        )
     if told["result"]:
         out.print(f"\nwrote {escape(told['result'])}; use it with --preset {escape(told['result'])}")
     if told["report"]:

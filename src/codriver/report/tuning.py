@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from codriver.report.document import BLACK, COLORS, GREY, Chart, Curve, Document, Mark, Plot, Section, Table
-from codriver.tune import Point, Tuning, Whiteness
+from codriver.tune import NoiseFit, Point, Tuning, Whiteness
 from codriver.tune.likelihood import LEAST_BLOCKS
 
 _QUICK = 0.2  # s; below it ripples of body and driveline pass for intention
@@ -109,20 +109,11 @@ def _likelihood(result: Tuning) -> Section:
     parts: list[str | Chart | Table] = [chart]
     if result.blocks < LEAST_BLOCKS:
         parts.append(
-            f"How sure the most likely ell is cannot be said: {result.blocks} blocks of 10 s count, {LEAST_BLOCKS} are needed."
+            f"How sure the most likely ell is cannot be said: too few blocks of 10 s count ({result.blocks}, {LEAST_BLOCKS} are needed)."
         )
     fit = result.noise
     if fit is not None:
-        ending = (
-            "The search ended by itself."
-            if fit.converged
-            else "The search did not end by itself: take the values with care."
-        )
-        parts.append(
-            f"Log likelihood {fit.start.log_likelihood:.0f} with {result.begun.name}, {fit.found.log_likelihood:.0f} with the "
-            f"fitted noise, over {fit.found.count} rows. {ending} The common factor of Q and R is found in closed form "
-            f"({fit.found.factor:.3g}) and changes no gain; ell is no parameter beside a free Q and R."
-        )
+        parts.append(_fitted(result.begun.name, fit))
         rows = []
         for r in fit.ratios:
             mark = (
@@ -145,6 +136,20 @@ def _likelihood(result: Tuning) -> Section:
                 "driveline as if they were intended. Give --delay as well to choose how late it may be."
             )
     return Section("What the rows say", tuple(parts))
+
+
+def _fitted(begun: str, fit: NoiseFit) -> str:
+    """What the fit of Q and R came to, in words."""
+    ending = (
+        "The search ended by itself."
+        if fit.converged
+        else "The search did not end by itself: take the values with care."
+    )
+    return (
+        f"Log likelihood {fit.start.log_likelihood:.0f} with {begun}, {fit.found.log_likelihood:.0f} with the "
+        f"fitted noise, over {fit.found.count} rows. {ending} The common factor of Q and R is found in closed form "
+        f"({fit.found.factor:.3g}) and changes no gain; ell is no parameter beside a free Q and R."
+    )
 
 
 def _innovations(result: Tuning) -> Section:
