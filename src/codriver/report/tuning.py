@@ -109,7 +109,8 @@ def _likelihood(result: Tuning) -> Section:
     parts: list[str | Chart | Table] = [chart]
     if result.blocks < LEAST_BLOCKS:
         parts.append(
-            f"How sure the most likely ell is cannot be said: too few blocks of 10 s count ({result.blocks}, {LEAST_BLOCKS} are needed)."
+            f"How sure the most likely ell is cannot be said: too few blocks of 10 s count ({result.blocks}, "
+            f"{LEAST_BLOCKS} are needed)."
         )
     fit = result.noise
     if fit is not None:
