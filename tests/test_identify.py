@@ -604,6 +604,17 @@ class TestSaturation:
         assert found.coefficients["c_b"].value == pytest.approx(C_B, rel=0.01)
         assert any(f"{name} stays at {end:.4g}" in f.text for f in found.rows.clipped)
 
+    def test_hardly_any_braking_is_left(self, road, car):
+        """Cut off at 3 bar: no wrong sign is blamed, and the sensor's end is among the reasons."""
+        cut = changed(road.between(0, 1200), "brake_pressure", lambda p: np.minimum(p, 3e5))
+        try:
+            found = identify_brake(cut, car)
+            said = " ".join(r.reason for r in found.refused) + " ".join(f.text for f in brake_findings(found))
+        except LogError as error:
+            said = str(error)
+        assert "pressure's sign" not in said
+        assert "brake_pressure stays at 3 bar" in said
+
     def test_honest_signals_have_no_plateau(self, fit):
         assert fit.rows.clipped == ()
 

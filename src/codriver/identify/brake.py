@@ -250,7 +250,9 @@ def _refuse_values(found: Mapping[str, Coefficient], fit: Regression, M: float, 
     """What was fitted and still says too little."""
     refused = []
     if (c := found.get("c_b")) is not None and (c.value <= 0 or c.sd > BRAKE_SD * c.value):
-        why = "not positive: is the pressure's sign right?" if c.value <= 0 else "too little braking"
+        why = (
+            "negative: is the pressure's sign right?" if c.value < -4 * c.sd else "too little braking that can be used"
+        )
         refused.append(Refusal("c_b", f"{c.value:.3g} N/Pa with a standard error of {c.sd:.2g}: {why}"))
     elif c is not None and not BRAKE_PER_MASS[0] <= c.value / M <= BRAKE_PER_MASS[1]:
         refused.append(Refusal(
