@@ -111,9 +111,7 @@ def condemned(fit: BrakeFit) -> list[Finding]:
 def refuse_condemned(fit: BrakeFit) -> None:
     """Raises LogError where the fit is condemned, with all the reasons."""
     if condemned(fit):
-        reasons = [
-            f.text for f in (*brake_findings(fit), *fit.rows.clipped) if f.severity == "bad" or f in fit.rows.clipped
-        ]
+        reasons = [f.text for f in brake_findings(fit) if f.severity == "bad" or f in fit.rows.clipped]
         raise LogError(
             f"{', '.join(fit.sources)}: {'; '.join(reasons)}", "coefficients that their own validation bears out",
             "mend what is named; nothing was written",
