@@ -129,8 +129,9 @@ def test_the_whole_way_is_the_papers():
     assert trace["distance"][-1] == pytest.approx(53_000, abs=500)
     assert trace["time"][-1] / 60 == pytest.approx(42, abs=2)
     start, stop = test.span(ROAD_TEST_STRETCHES["comparison"])
+    # The paper's figure 4; its driver was brisk, this one is ordinary.
     assert start == pytest.approx(1450, abs=25)
-    assert stop == pytest.approx(1560, abs=35)
+    assert stop == pytest.approx(1560, abs=45)
     limit = trace.road.limit[trace["distance"].astype(int)]
     over = trace["speed"] - trace.style.speed * limit
     # A little over it by overshoot; more only where a sign has just come and the slowing is not quite done.

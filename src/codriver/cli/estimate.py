@@ -154,7 +154,8 @@ def check_with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> C
     from codriver.identify import check_vehicle_against_log
     from codriver.observers.gears import unknown_gears
 
-    found = [f for f in check_vehicle_against_log(log, vehicle) if f.severity != "ok"]
+    said = {f.text for f in check.findings}
+    found = [f for f in check_vehicle_against_log(log, vehicle) if f.severity != "ok" and f.text not in said]
     order = {"bad": 0, "warn": 1, "ok": 2}
     findings = sorted(
         [
