@@ -26,10 +26,10 @@ def run(quick: bool = False) -> Iterator[Row]:
     vehicle = cd.load_vehicle("bisoffi2017")
     for name in ESTIMATORS:
         say(f"  {name}")
-        stepper = cd.compile(cd.build(name, vehicle)).live()
-        channels = stepper.inputs[: len(stepper.inputs) // 2]
-        values = {channel: TYPICAL[channel] for channel in channels}
-        row = [*values.values(), *[1] * len(channels)]
+        observer = cd.build(name, vehicle)
+        stepper = cd.compile(observer).live()
+        values = {channel: TYPICAL[channel] for channel in observer.channels}
+        row = [*values.values(), *[1] * len(observer.flags)]
 
         def quickly(stepper=stepper, row=row) -> None:
             for _ in range(calls):
