@@ -845,3 +845,9 @@ def test_demo(run, tmp_path):
     assert about[b"command"].startswith(b"codriver estimate intent ")
     line = next(line for line in ran.out.splitlines() if line.startswith("intentional jerk, lag taken out"))
     assert float(line.split()[5]) < 0.2
+
+
+def test_a_loggers_abbreviation_is_proposed(run, demo_files):
+    """The demo's logger calls the speed VehSpd."""
+    ran = run("info", demo_files.logger)
+    assert 'source = "VehSpd"' in ran.out

@@ -18,9 +18,9 @@ from codriver.names import VOCABULARY
 from codriver.units import to_si
 
 NAME = "longitudinal_speed"
-_CALLED = re.compile(r"speed|veloc|geschwindigkeit|vitesse", re.IGNORECASE)
+_CALLED = re.compile(r"speed|spd|veloc|geschwindigkeit|vitesse", re.IGNORECASE)
 _OTHER = re.compile(
-    r"accel|engine|motor|turbine|fan|wind|accura|limit|cruise|target|desired|setpoint|lateral|valid|turn|yaw|steer",
+    r"accel|engine|eng_?spd|motor|turbine|fan|wind|accura|limit|cruise|target|desired|setpoint|lateral|valid|turn|yaw|steer",
     re.IGNORECASE,
 )
 _FLAG = re.compile(r"valid|ready", re.IGNORECASE)
@@ -49,7 +49,7 @@ def _rank(channel: SourceChannel) -> int:
     if (channel.unit and not known) or _OTHER.search(channel.name) or not (known or _CALLED.search(channel.name)):
         return -1
     name = channel.name.lower()
-    return 4 * known + 2 * (_CALLED.search(name) is not None) + ("vehicle" in name) - ("wheel" in name or "whl" in name)
+    return 4 * known + 2 * (_CALLED.search(name) is not None) + ("veh" in name) - ("wheel" in name or "whl" in name)
 
 
 def _measures_speed(unit: str) -> bool:
