@@ -142,5 +142,5 @@ def _chart(mean: Mean) -> Chart:
             ))  # fmt: skip
     return Chart(
         "How well the planned jerk is known, and how late", "lag (s)", (Plot("best correlation", tuple(curves), 260),),
-        "Up and to the left is better. A larger ell is earlier; the pedals alone are earliest as long as they are clean.",
+        "Up and to the left is better. A larger ell is earlier.",
     )  # fmt: skip
