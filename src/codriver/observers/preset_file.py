@@ -13,8 +13,6 @@ files are.
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
@@ -24,6 +22,7 @@ from codriver.errors import UsageError
 from codriver.names import nearest
 from codriver.observers.scaled_gain import ELL_RANGE, PRESETS, Preset
 from codriver.toml_file import parse_tables, read_text
+from codriver.whole_file import write_text
 
 _KEYS = ("name", "source", "ell", "Q", "R")
 _EXPECTED = "name, source, ell, Q (four numbers) and R (two numbers), each above 0"
@@ -92,21 +91,12 @@ def save_preset(preset: Preset, path: str | Path) -> None:
     )
     if parse_preset(text, "the preset") != preset:
         raise UsageError(f"the file of '{preset.name}' would be read as another preset", _EXPECTED, "check its numbers")
-    draft: Path | None = None
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
-        draft = Path(name)
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        draft.chmod(0o644)  # mkstemp's file is for its owner alone
-        draft.replace(target)
+        write_text(target, text)
     except OSError as error:
         raise UsageError(
             f"cannot write {path}: {error.strerror or error}", "a folder you may write into", "choose another name"
         ) from error
-    finally:
-        if draft is not None:
-            draft.unlink(missing_ok=True)
 
 
 def preset_settings(preset: Preset) -> dict[str, str]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 
 from codriver.errors import UsageError
@@ -11,6 +9,7 @@ from codriver.estimate import Estimate
 from codriver.report.page import page
 from codriver.signals import Log
 from codriver.trust import Check
+from codriver.whole_file import write_text
 
 
 def write_report(
@@ -47,20 +46,11 @@ def write_whole(content: str, target: Path) -> None:
     Raises:
         UsageError: the file cannot be written.
     """
-    temporary: Path | None = None
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
-        temporary = Path(name)
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(content)
-        temporary.chmod(0o644)  # mkstemp's file is for its owner alone
-        temporary.replace(target)
+        write_text(target, content)
     except OSError as error:
         raise UsageError(
             f"the report {target} cannot be written: {error.strerror or error}",
             "a file in a folder that exists and may be written",
             "make the folder, or choose another path",
         ) from error  # fmt: skip
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from contextlib import suppress
 from pathlib import Path
-from uuid import uuid4
 
 from codriver.errors import VehicleError
 from codriver.vehicles.load import parse_vehicle
 from codriver.vehicles.vehicle import Parameter, Vehicle
+from codriver.whole_file import write_text
 
 
 def save_vehicle(vehicle: Vehicle, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -38,17 +37,12 @@ def save_vehicle(vehicle: Vehicle, path: str | Path, *, overwrite: bool = False)
             "parameters in the units of codriver.vehicles.KNOWN",
             "make parameters with Vehicle.with_parameter",
         )
-    draft = path.with_name(f".{path.stem}-{uuid4().hex[:8]}.toml")
     try:
-        draft.write_text(text, encoding="utf-8", newline="\n")
-        draft.replace(path)
+        write_text(path, text)
     except OSError as error:
         raise VehicleError(
             f"cannot write {path}: {error.strerror or error}", "a folder you may write into", "choose another folder"
         ) from None
-    finally:
-        with suppress(OSError):
-            draft.unlink(missing_ok=True)
     return path
 
 
