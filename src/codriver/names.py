@@ -108,6 +108,15 @@ _ENTRIES = (
     ),
     Quantity("rider_torque", "N*m", "N*m", "T_r", "torque of the rider's hands on the handlebar", -300, 300),
     Quantity("alignment_torque", "N*m", "N*m", "T_aln", "torque of the tyres on the steering column", -300, 300),
+    Quantity(
+        "column_torque",
+        "N*m",
+        "N*m",
+        "T_k",
+        "all torques on the steering column but the driver's, friction included",
+        -300,
+        300,
+    ),
     Quantity("front_lateral_force", "N", "N", "Y_f", "lateral force of the front tyres, positive to the left"),
     Quantity("rear_lateral_force", "N", "N", "Y_r", "lateral force of the rear tyres, positive to the left"),
     # what the powertrain does

@@ -1,0 +1,140 @@
+"""What acts on a steering column beside the driver's hands: the known torque of the driver-torque estimators.
+
+    T_k = T_aln - T_f                             torque of the tyres or of the motor that stands for them, less friction
+
+    logged     T_aln = alignment_torque                               a simulator's log
+    motor      T_aln = steering_motor_torque                          a force-feedback wheel: the motor is all that acts
+    command    T_aln = torque_scale T_com + torque_offset             the same, in the device's own unit (89)
+
+Friction is Dahl's: its state z runs towards the direction of motion within the presliding angle d, so a wheel that rests keeps
+the torque it came to rest with, and nothing chatters when an encoder's last digit does:
+
+    z <- sgn + (z - sgn) exp(-|Delta delta| / d),   T_f = T_c z
+
+A wheel that sticks can hold any torque up to T_c: the variance of T_f is T_c^2 (1 - z^2) / 3 + (sd of T_c)^2 z^2, that of a
+uniform torque where z = 0. Dahl 1968 (Aerospace Corporation, TOR-0158(3107-18)-1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+from codriver.kernel import Scalar, select
+from codriver.observers.observer import Scalars
+from codriver.vehicles import Vehicle
+
+PRESLIDING = 0.2 * pi / 180  # rad, where the vehicle file says nothing
+FRICTION_SD = 0.1  # of T_c, where the vehicle file says nothing
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a tick tells of the column.
+
+    Attributes:
+        torque: all that acts beside the hands, N m.
+        variance: of it, (N m)^2.
+        known: 1 where all of it is there.
+        memory: the new carry.
+    """
+
+    torque: Scalar
+    variance: Scalar
+    known: Scalar
+    memory: Scalars
+
+
+@dataclass(frozen=True)
+class Column:
+    """A source of that torque.
+
+    Attributes:
+        inputs: standard names it reads, held.
+        carry: its carried scalars and their start.
+        at: (carry, u, ok, angle, moved) -> Moment; the angle is the wheel's, unwrapped, rad; `moved` by how much since the last
+            sample, 0 on ticks without one.
+        settings: for provenance.
+        optional: those of the inputs that need not be there.
+    """
+
+    inputs: tuple[str, ...]
+    carry: Mapping[str, float]
+    at: Callable[[Scalars, Scalars, Scalars, Scalar, Scalar], Moment]
+    settings: Mapping[str, str | float]
+    optional: frozenset[str] = frozenset()
+
+
+def logged_column(vehicle: Vehicle, name: str = "alignment_torque") -> Column:
+    """The torque that the log holds under a name, less friction.
+
+    Args:
+        vehicle: with steering_friction, if there is friction; with torque_scale for `steering_motor_command`.
+        name: "alignment_torque", "steering_motor_torque" or "steering_motor_command".
+    """
+    scale, offset = 1.0, 0.0
+    if name == "steering_motor_command":
+        scale = vehicle.number("torque_scale")
+        offset = vehicle.number("torque_offset") if "torque_offset" in vehicle else 0.0
+    rubbing = friction_of(vehicle)
+
+    def at(carry: Scalars, u: Scalars, ok: Scalars, angle: Scalar, moved: Scalar) -> Moment:
+        there = ok[name]
+        torque = scale * select(there, u[name], 0.0) + offset
+        z, against, variance = rubbing.at(carry["bristle"], moved)
+        return Moment(torque - against, variance, there, {"bristle": z})
+
+    return Column((name,), {"bristle": 0.0}, at, {"known_torque": name, **rubbing.settings})
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Coulomb friction with presliding.
+
+    Attributes:
+        level: T_c, N m.
+        sd: of T_c, N m.
+        width: presliding angle d, rad.
+    """
+
+    level: float
+    sd: float
+    width: float
+
+    def at(self, z: Scalar, moved: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+        """The new state, the torque against the motion (N m) and its variance, after the wheel moved by so much (rad)."""
+        if self.level == 0:
+            return z, 0.0, 0.0
+        size = select(moved < 0, -moved, moved)
+        direction = select(moved < 0, -1.0, 1.0)
+        new = direction + (z - direction) * _exponential(-size / self.width)
+        square = new * new
+        spread = self.level**2 / 3.0
+        return new, self.level * new, spread * (1.0 - square) + self.sd**2 * square
+
+    @property
+    def settings(self) -> dict[str, str | float]:
+        """For provenance."""
+        return {"friction": self.level} if self.level else {}
+
+
+def friction_of(vehicle: Vehicle) -> Friction:
+    """The friction of a vehicle file; none where it has none."""
+    level = vehicle.number("steering_friction") if "steering_friction" in vehicle else 0.0
+    given = vehicle.parameters["steering_friction"].sd if level else None
+    sd = float(given) if isinstance(given, (int, float)) else FRICTION_SD * level
+    width = vehicle.number("steering_presliding") if "steering_presliding" in vehicle else PRESLIDING
+    return Friction(level, sd, width)
+
+
+def _exponential(x: Any) -> Any:
+    """exp, of a number or a symbol."""
+    if isinstance(x, (int, float)):
+        from math import exp
+
+        return exp(x)
+    import casadi
+
+    return casadi.exp(x)

@@ -1,0 +1,161 @@
+"""What drives a steering wheel's unknown torque, and what disturbs its encoder: the noise of the driver-torque filters.
+
+    order 1   T_dr' = torque * w                    a random walk: a driver who changes the torque at any moment
+    order 2   T_dr' = s,  s' = torque * w           an integrated one: a torque that runs on as it does
+    omega'  = ... + rate * w                        what jolts the wheel beside all torques
+    y       = delta + angle * n                     n of each sample of the encoder
+
+w is white noise of intensity 1, n has variance 1. `codriver tune driver-torque` and `codriver estimate driver-torque` find them by
+maximum likelihood on a record; a file holds them:
+
+    name = "rig"
+    source = "fitted on drive.csv"
+    order = 1
+    angle = 0.0005     # rad
+    rate = 0.01        # rad/s per sqrt(s)
+    torque = 8.0       # N m per sqrt(s); at order 2, N m/s per sqrt(s)
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from codriver.errors import UsageError
+from codriver.names import nearest
+from codriver.toml_file import parse_tables, read_text
+from codriver.whole_file import write_text
+
+_NUMBERS = ("angle", "rate", "torque")
+_KEYS = ("name", "source", "order", *_NUMBERS)
+_EXPECTED = "name, source, order (1 or 2), angle, rate and torque (numbers; angle and torque above 0)"
+
+
+@dataclass(frozen=True)
+class TorqueNoise:
+    """The noise.
+
+    Attributes:
+        order: of the torque's random walk, 1 or 2.
+        angle: standard deviation of a sample of the angle, rad.
+        rate: square root of the intensity that jolts the rate, rad/s per sqrt(s).
+        torque: of the one that drives the torque, N m per sqrt(s), or N m/s per sqrt(s) at order 2.
+        source, name: where it comes from, and what it is called.
+    """
+
+    order: int
+    angle: float
+    rate: float
+    torque: float
+    source: str = "given"
+    name: str = "own"
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be.
+
+        Raises:
+            UsageError: see there.
+        """
+        numbers = (self.angle, self.rate, self.torque)
+        if self.order not in (1, 2) or not all(map(isfinite, numbers)) or min(self.angle, self.torque) <= 0 or self.rate < 0:
+            raise UsageError(f"order {self.order}, noises {numbers}", _EXPECTED, "correct them")
+
+    def settings(self) -> dict[str, str | float]:
+        """For provenance."""
+        return {
+            "preset": self.name, "order": self.order, "angle_noise": self.angle, "rate_noise": self.rate,
+            "torque_noise": self.torque,
+        }  # fmt: skip
+
+
+# Of simulated drivers and an encoder of 0.1 degree: docs/driver-torque.md. A record of one's own gives better ones.
+TORQUE_NOISES = {"driver": TorqueNoise(1, 5e-4, 0.0, 8.0, "simulated drivers, encoder of 0.1 degree", "driver")}
+
+
+def find_torque_noise(preset: str | Path | TorqueNoise) -> TorqueNoise:
+    """A noise itself, a built-in one by name, or that of a file by its path.
+
+    Raises:
+        UsageError: there is no such preset or file, the file is wrong, or it is a preset of another kind.
+    """
+    if isinstance(preset, TorqueNoise):
+        return preset
+    if not isinstance(preset, (str, Path)):
+        raise UsageError(
+            f"a {type(preset).__name__} as the noise of a steering torque", "a TorqueNoise, a name or a path", "give one"
+        )
+    if str(preset) in TORQUE_NOISES:
+        return TORQUE_NOISES[str(preset)]
+    path = Path(preset)
+    if path.suffix != ".toml" and not path.exists():
+        near = nearest(str(preset), TORQUE_NOISES)
+        raise UsageError(
+            f"no preset '{preset}' for a steering torque",
+            f"one of {', '.join(TORQUE_NOISES)}, or the path of a .toml file; or none: it is fitted to the record then",
+            f"did you mean {near}?" if near else "choose one, or write one with `codriver tune driver-torque`",
+        )  # fmt: skip
+    return parse_torque_noise(read_text(path, "preset", UsageError), str(path))
+
+
+def parse_torque_noise(text: str, where: str) -> TorqueNoise:
+    """A noise from the text of its file.
+
+    Raises:
+        UsageError: listing every fault of the file.
+    """
+    table = parse_tables(text, where, UsageError)
+    faults = [f"'{key}' is not known" for key in table if key not in _KEYS]
+    faults += [f"'{key}' is missing" for key in _KEYS if key not in table]
+    faults += [f"'{key}' must be a text" for key in ("name", "source") if not isinstance(table.get(key, ""), str)]
+    faults += [f"'{key}' must be a number" for key in _NUMBERS if not _number(table.get(key, 1.0))]
+    if isinstance(table.get("order", 1), bool) or table.get("order", 1) not in (1, 2):
+        faults.append("'order' must be 1 or 2")
+    faults += [f"'{key}' must be above 0" for key in ("angle", "torque") if _number(table.get(key)) and not table[key] > 0]
+    if _number(table.get("rate")) and table["rate"] < 0:
+        faults.append("'rate' must not be negative")
+    if isinstance(table.get("name"), str) and (table["name"] in TORQUE_NOISES or not table["name"].strip()):
+        faults.append(f"the name '{table['name']}' is a built-in one, or empty")
+    if faults:
+        raise UsageError(
+            f"{where}: {'; '.join(faults)}", _EXPECTED, "mend the file, or write it with `codriver tune driver-torque`"
+        )
+    numbers = (float(table[key]) for key in _NUMBERS)
+    return TorqueNoise(int(table["order"]), *numbers, table["source"], table["name"])
+
+
+def save_torque_noise(noise: TorqueNoise, path: str | Path) -> None:
+    """Write a file that `find_torque_noise` reads; it appears under its name only when it is complete.
+
+    Raises:
+        UsageError: the name does not end in .toml, the file cannot be written, or it would not be read again.
+    """
+    target = Path(path)
+    if target.suffix != ".toml":
+        raise UsageError(f"cannot write a preset to '{target.name}'", "a name ending in .toml", "choose such a name")
+    per = "N m per sqrt(s)" if noise.order == 1 else "N m/s per sqrt(s)"
+    text = (
+        f"name = {_quoted(noise.name)}\nsource = {_quoted(noise.source)}\n"
+        f"# of the torque's random walk: 1, or 2 for an integrated one\norder = {noise.order}\n"
+        f"angle = {noise.angle!r}  # rad, of a sample\nrate = {noise.rate!r}  # rad/s per sqrt(s)\n"
+        f"torque = {noise.torque!r}  # {per}\n"
+    )
+    if replace(parse_torque_noise(text, "the preset"), name=noise.name) != noise:
+        raise UsageError(f"the file of '{noise.name}' would be read as another one", _EXPECTED, "check its numbers")
+    try:
+        write_text(target, text)
+    except OSError as error:
+        raise UsageError(
+            f"cannot write {path}: {error.strerror or error}", "a folder you may write into", "choose another name"
+        ) from error
+
+
+def _number(x: Any) -> bool:
+    return isinstance(x, (int, float)) and not isinstance(x, bool) and isfinite(x)
+
+
+def _quoted(text: str) -> str:
+    """A string as TOML writes it: as JSON does, but DEL too must be escaped."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
