@@ -54,7 +54,7 @@ def driver_torque_design(vehicle: Vehicle, noise: TorqueNoise, dt: float) -> Dis
     )
     return design_disturbance_filter(
         model, ("driver_torque",), dt, unknown_noise=[noise.torque**2], output_noise=[noise.angle**2],
-        state_noise=[0.0, noise.rate**2], order=noise.order,
+        state_noise=[noise.slip**2, noise.rate**2], order=noise.order,
     )  # fmt: skip
 
 
