@@ -48,7 +48,7 @@ def test_best_in_order_of_preference(car):
 
 def test_another_family_is_never_the_best_of_this_one(toy, car):
     angle = {"steering_wheel_angle"}
-    assert families() == ("intent", "torque")
+    assert {"intent", "torque"} <= set(families())
     with pytest.raises(MissingSignal):
         best(angle, car)
     assert best(angle, None, family="torque").estimator == "toy-wheel"

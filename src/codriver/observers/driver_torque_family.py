@@ -58,11 +58,11 @@ class PIWeights:
         return {"preset": self.name, "V_1": " ".join(f"{v:g}" for v in self.V_1), "V_2": f"{self.V_2:g}"}
 
 
-# The simulation's and the simulator's; section 4.1 and 4.2 of the paper.
+# The simulation's and the simulator's; section 4.1 and 4.2 of the paper, whose steps of Runge and Kutta hold their inputs.
 PI_WEIGHTS = {
-    "okamoto2019": PIWeights((1.0, 1.0, 1e11), 1.0, "straight", "2019, section 4.1", "okamoto2019"),
+    "okamoto2019": PIWeights((1.0, 1.0, 1e11), 1.0, "held", "2019, section 4.1", "okamoto2019"),
     "okamoto2019-simulator": PIWeights(
-        (1.0, 1.0, 3.1e9), 1.0, "straight", "2019, section 4.2", "okamoto2019-simulator"
+        (1.0, 1.0, 3.1e9), 1.0, "held", "2019, section 4.2", "okamoto2019-simulator"
     ),
 }
 
