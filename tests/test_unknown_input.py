@@ -164,7 +164,8 @@ class TestRefusals:
                 design()
 
     @pytest.mark.parametrize(
-        ("V_1", "V_2"), [([1, 1], 1.0), ([1, -1, 1], 1.0), ([1, 1, 1], 0.0), (np.ones((3, 2)), 1.0), ([1, 1, np.nan], 1.0)]
+        ("V_1", "V_2"),
+        [([1, 1], 1.0), ([1, -1, 1], 1.0), ([1, 1, 1], 0.0), (np.ones((3, 2)), 1.0), ([1, 1, np.nan], 1.0)],
     )
     def test_weights_that_cannot_be(self, V_1, V_2):
         with pytest.raises(DesignError):
@@ -215,7 +216,13 @@ class TestKalman:
         y = y[:, 0] + 1e-3 * rng.standard_normal(T.size)
         missing = rng.random(T.size) < 0.25
         d = design_disturbance_filter(
-            wheel(), ("driver_torque",), DT, unknown_noise=[30.0], output_noise=[1e-6], state_noise=[0, 0.01], order=order
+            wheel(),
+            ("driver_torque",),
+            DT,
+            unknown_noise=[30.0],
+            output_noise=[1e-6],
+            state_noise=[0, 0.01],
+            order=order,
         )
         sd = [1.0, 5.0, 20.0, 100.0][: 2 + order]
         out = run(disturbance_observer(d, sd), {"steering_wheel_angle": y, "alignment_torque": ALIGNMENT}, missing)
@@ -232,7 +239,9 @@ class TestKalman:
 
     def test_remark_3_does_not_hold(self):
         """One measurement and one unknown input: the filter needs a detectable pair, not more measurements than inputs."""
-        d = design_disturbance_filter(wheel(), ("driver_torque",), DT, unknown_noise=[1e4], output_noise=[1e-10], order=2)
+        d = design_disturbance_filter(
+            wheel(), ("driver_torque",), DT, unknown_noise=[1e4], output_noise=[1e-10], order=2
+        )
         y, _ = moved(wheel(), np.column_stack([ALIGNMENT, DRIVER]), np.array([0.1, 0.0]))
         observer = disturbance_observer(d, [1, 5, 20, 100])
         out = run(observer, {"steering_wheel_angle": y[:, 0], "alignment_torque": ALIGNMENT})
@@ -241,15 +250,20 @@ class TestKalman:
     def test_stationary_gain_is_that_of_the_running_filter(self):
         d = design_disturbance_filter(wheel(), ("driver_torque",), DT, unknown_noise=[30.0], output_noise=[1e-6])
         out = run(
-            disturbance_observer(d, [1, 5, 20]), {"steering_wheel_angle": np.zeros(T.size), "alignment_torque": ALIGNMENT}
+            disturbance_observer(d, [1, 5, 20]),
+            {"steering_wheel_angle": np.zeros(T.size), "alignment_torque": ALIGNMENT},
         )
         assert out["driver_torque_sd"][-1] == pytest.approx(float(np.sqrt(d.P[2, 2])), rel=1e-9)
 
     def test_checklist(self):
-        d = design_disturbance_filter(two_masses(), ("driver_torque",), 0.02, unknown_noise=[3.0], output_noise=[1, 2], order=2)
+        d = design_disturbance_filter(
+            two_masses(), ("driver_torque",), 0.02, unknown_noise=[3.0], output_noise=[1, 2], order=2
+        )
         check_observer(disturbance_observer(d, np.ones(6)))
 
     def test_noises_that_cannot_be(self):
         for noise in ({"unknown_noise": [0.0]}, {"output_noise": [-1.0]}, {"state_noise": [1.0]}):
             with pytest.raises(DesignError, match="correct the noises"):
-                design_disturbance_filter(wheel(), ("driver_torque",), DT, **{"unknown_noise": [1], "output_noise": [1], **noise})
+                design_disturbance_filter(
+                    wheel(), ("driver_torque",), DT, **{"unknown_noise": [1], "output_noise": [1], **noise}
+                )

@@ -99,9 +99,7 @@ def fit_torque_noise(name: str, log: Log, vehicle: Vehicle, rate: float, label: 
         source = f"maximum likelihood on {log.source or 'a record'}"
         best[order] = value, TorqueNoise(order, *sizes, source=source, name=label)
     order = max(best, key=lambda o: best[o][0])
-    return TorqueFit(
-        best[order][1], {o: value for o, (value, _) in best.items()}, int(counted.sum()), rows.seconds
-    )
+    return TorqueFit(best[order][1], {o: value for o, (value, _) in best.items()}, int(counted.sum()), rows.seconds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +137,9 @@ def _rows(columns: Mapping[str, Array], grid: Grid) -> _Rows:
     cut = {name: np.ascontiguousarray(column[chosen]) for name, column in made.items()}
     flags = dict.fromkeys(cut, there[chosen])
     n = int(chosen.sum())
-    return _Rows(Grid(grid.dt * np.arange(n, dtype=np.float64), grid.dt, cut, flags, flags), counted[chosen], n * grid.dt)
+    return _Rows(
+        Grid(grid.dt * np.arange(n, dtype=np.float64), grid.dt, cut, flags, flags), counted[chosen], n * grid.dt
+    )
 
 
 def _chosen(n: int, dt: float) -> Flags:

@@ -61,9 +61,7 @@ class PIWeights:
 # The simulation's and the simulator's; section 4.1 and 4.2 of the paper, whose steps of Runge and Kutta hold their inputs.
 PI_WEIGHTS = {
     "okamoto2019": PIWeights((1.0, 1.0, 1e11), 1.0, "held", "2019, section 4.1", "okamoto2019"),
-    "okamoto2019-simulator": PIWeights(
-        (1.0, 1.0, 3.1e9), 1.0, "held", "2019, section 4.2", "okamoto2019-simulator"
-    ),
+    "okamoto2019-simulator": PIWeights((1.0, 1.0, 3.1e9), 1.0, "held", "2019, section 4.2", "okamoto2019-simulator"),
 }
 
 

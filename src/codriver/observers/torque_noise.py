@@ -90,7 +90,9 @@ def find_torque_noise(preset: str | Path | TorqueNoise) -> TorqueNoise:
         return preset
     if not isinstance(preset, (str, Path)):
         raise UsageError(
-            f"a {type(preset).__name__} as the noise of a steering torque", "a TorqueNoise, a name or a path", "give one"
+            f"a {type(preset).__name__} as the noise of a steering torque",
+            "a TorqueNoise, a name or a path",
+            "give one",
         )
     if str(preset) in TORQUE_NOISES:
         return TORQUE_NOISES[str(preset)]
@@ -118,8 +120,12 @@ def parse_torque_noise(text: str, where: str) -> TorqueNoise:
     faults += [f"'{key}' must be a number" for key in _NUMBERS if not _number(table.get(key, 1.0))]
     if isinstance(table.get("order", 1), bool) or table.get("order", 1) not in (1, 2):
         faults.append("'order' must be 1 or 2")
-    faults += [f"'{key}' must be above 0" for key in ("angle", "torque") if _number(table.get(key)) and not table[key] > 0]
-    faults += [f"'{key}' must not be negative" for key in ("slip", "rate") if _number(table.get(key)) and table[key] < 0]
+    faults += [
+        f"'{key}' must be above 0" for key in ("angle", "torque") if _number(table.get(key)) and not table[key] > 0
+    ]
+    faults += [
+        f"'{key}' must not be negative" for key in ("slip", "rate") if _number(table.get(key)) and table[key] < 0
+    ]
     if isinstance(table.get("name"), str) and (table["name"] in TORQUE_NOISES or not table["name"].strip()):
         faults.append(f"the name '{table['name']}' is a built-in one, or empty")
     if faults:

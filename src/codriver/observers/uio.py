@@ -18,7 +18,11 @@ from codriver.observers.uio_design import UIODesign
 
 
 def unknown_input_observer(
-    design: UIODesign, dt: float, *, name: str = "unknown-input-observer", settings: Mapping[str, str | float] | None = None
+    design: UIODesign,
+    dt: float,
+    *,
+    name: str = "unknown-input-observer",
+    settings: Mapping[str, str | float] | None = None,
 ) -> Observer:
     """An unknown-input observer that compiles, runs live and exports.
 
@@ -59,7 +63,9 @@ def unknown_input_observer(
         }  # fmt: skip
         return new, {**dict(zip(system.outputs, found, strict=True)), "valid": since >= settle}
 
-    carry = dict.fromkeys([*(f"s_{k}" for k in range(n)), *(f"w_{k}" for k in range(len(channels))), "begun", "since"], 0.0)
+    carry = dict.fromkeys(
+        [*(f"s_{k}" for k in range(n)), *(f"w_{k}" for k in range(len(channels))), "begun", "since"], 0.0
+    )
     outputs = (
         *(Output(o, unit_of(o), "estimate", meaning_of(o)) for o in system.outputs),
         Output("valid", "1", "flag", "1 where everything is measured and the start has died away"),

@@ -151,6 +151,8 @@ def _certify(A: Array, B: Array, C: Array, D: Array, N: Array, L: Array, G: Arra
     )
     if not (decay > 0 and max(decoupled, by_state, by_input) < 1e-9):
         raise DesignError(
-            f"the unknown-input observer fails its certificate: {'; '.join(claims)}", "a stable one", "choose other weights"
+            f"the unknown-input observer fails its certificate: {'; '.join(claims)}",
+            "a stable one",
+            "choose other weights",
         )
     return Certificate(True, claims, eigenvalues, np.empty(0, complex), decay)

@@ -46,4 +46,3 @@ def with_memory(observer: Observer, shown: Sequence[str]) -> Observer:
         return new, {**out, **{name: new[name] for name in shown}}
 
     return replace(observer, outputs=(*observer.outputs, *(Output(name, "", "input") for name in shown)), step=step)
-
