@@ -90,7 +90,7 @@ class TestTheorem1:
         d = design_pi_observer(wheel(), ("driver_torque",), [1, 1, 1e5], 1e-4, own)
         y, _ = moved(wheel(), np.column_stack([ALIGNMENT, np.full(T.size, 1.7)]), np.array([0.3, 0.0]))
         out = run(pi_observer(d, DT), {"steering_wheel_angle": y[:, 0], "alignment_torque": ALIGNMENT})
-        late = T > 10 / d.certificate.decay_rate
+        late = 10 / d.certificate.decay_rate < T
         assert late.sum() > 100
         np.testing.assert_allclose(out["driver_torque"][late], 1.7, atol=2e-3)
 

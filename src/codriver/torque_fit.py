@@ -12,9 +12,9 @@ parts from all over the record.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -93,11 +93,11 @@ def fit_torque_noise(name: str, log: Log, vehicle: Vehicle, rate: float, label: 
     best: dict[int, tuple[float, TorqueNoise]] = {}
     for order in ORDERS:
         program = _likelihood(J, b, dt, order)
-        found = _search(lambda ratios, program=program: _evidence(program, rows, ratios, J, floor))
-        value, factor = _evidence(program, rows, found, J, floor)
-        sizes = [float(np.sqrt(factor * q)) for q in (1.0, *_intensities(found, J))]
+        found = _search(partial(_evidence, program, rows, J, floor))
+        value, factor = _evidence(program, rows, J, floor, found)
+        angle, slip, rate_noise, torque = (float(np.sqrt(factor * q)) for q in (1.0, *_intensities(found, J)))
         source = f"maximum likelihood on {log.source or 'a record'}"
-        best[order] = value, TorqueNoise(order, *sizes, source=source, name=label)
+        best[order] = value, TorqueNoise(order, angle, slip, rate_noise, torque, source, label)
     order = max(best, key=lambda o: best[o][0])
     return TorqueFit(best[order][1], {o: value for o, (value, _) in best.items()}, int(counted.sum()), rows.seconds)
 
@@ -163,14 +163,14 @@ def _step_of(angle: Array) -> float:
     return low if float(np.mean(np.abs(steps / low - np.round(steps / low)) < 0.05)) > 0.8 else 0.0
 
 
-def _search(evidence: object) -> Array:
+def _search(evidence: Callable[[Array], tuple[float, float]]) -> Array:
     """The ratios, in decades, that make the record likeliest."""
     from scipy.optimize import minimize
 
     def cost(ratios: Array) -> float:
         if not all(RATIOS[0] <= r <= RATIOS[1] for r in ratios):
             return 1e300
-        return -evidence(ratios)[0]  # type: ignore[operator]
+        return -evidence(ratios)[0]
 
     starts = [np.array([a, r, t]) for a in SLIP_STARTS for r in RATE_STARTS for t in TORQUE_STARTS]
     costs = [cost(start) for start in starts]
@@ -186,7 +186,7 @@ def _search(evidence: object) -> Array:
     return np.asarray(min(ends, key=lambda end: float(end.fun)).x)
 
 
-def _evidence(program: Program, rows: _Rows, ratios: Array, J: float, floor: float) -> tuple[float, float]:
+def _evidence(program: Program, rows: _Rows, J: float, floor: float, ratios: Array) -> tuple[float, float]:
     """log L at the best factor, and that factor: the encoder's variance, rad^2."""
     noise = dict(zip(_NOISES, _intensities(ratios, J), strict=True))
     _, columns = program.advance(rows.grid, {**program.observer.carry, **noise})

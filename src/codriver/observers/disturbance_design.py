@@ -117,7 +117,7 @@ def design_disturbance_filter(
 def _certify(F: Array, left: Array, dt: float, unknown: tuple[str, ...]) -> Certificate:
     """What the gain shows: the poles of a tick."""
     poles = np.linalg.eigvals(left @ F).astype(complex)
-    continuous = np.log(np.where(poles == 0, 1e-300, poles)) / dt
+    continuous = np.asarray(np.log(np.where(poles == 0, 1e-300, poles)) / dt, dtype=complex)
     decay = float(-continuous.real.max())
     claims = (
         f"(A, C) with {', '.join(unknown)} among the states is detectable (PBH)",

@@ -132,8 +132,8 @@ def parse_torque_noise(text: str, where: str) -> TorqueNoise:
         raise UsageError(
             f"{where}: {'; '.join(faults)}", _EXPECTED, "mend the file, or write it with `codriver tune driver-torque`"
         )
-    numbers = (float(table[key]) for key in _NUMBERS)
-    return TorqueNoise(int(table["order"]), *numbers, table["source"], table["name"])
+    angle, slip, rate, torque = (float(table[key]) for key in _NUMBERS)
+    return TorqueNoise(int(table["order"]), angle, slip, rate, torque, table["source"], table["name"])
 
 
 def save_torque_noise(noise: TorqueNoise, path: str | Path) -> None:

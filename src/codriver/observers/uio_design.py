@@ -9,7 +9,7 @@ y' = C (A x + B u + D v), which is had only through a low-pass of the time const
 
     v^ = (C D)^+ [ s y / (1 + tau s) - (C A x^ + C B u) / (1 + tau s) ]  =  v / (1 + tau s)  once x^ = x
 
-A wheel of which only the angle is measured has C D = 0 (remark 3 of the 2019 paper): refused. With the rate measured, too, it exists.
+A wheel of which only the angle is measured has C D = 0 (remark 3 of the 2019 paper): refused. With the rate measured, it exists.
 Darouach, Zasadzinski, Xu 1994, doi:10.1109/9.280770; Okamoto, Tsiotras 2019 (Robotics and Autonomous Systems), remark 3.
 """
 
@@ -89,7 +89,7 @@ def design_unknown_input_observer(
             "rank(C D) = rank(D), eq. (51)",
             "measure the rate too, or use the PI observer or the Kalman filter, which do not need it",
         )  # fmt: skip
-    inverse = np.linalg.pinv(C @ D)
+    inverse = np.asarray(np.linalg.pinv(C @ D), dtype=np.float64)
     E = -D @ inverse
     PA = (np.eye(n) + E @ C) @ A
     still = undetectable(PA, C)
@@ -116,13 +116,13 @@ def _system(
     """States (z, y_f, g_f), y_f and g_f = low-passed y and C A x^ + C B u; inputs (y, u); outputs (x^, v^)."""
     A, C = model.A, model.C
     n, p, m, k = A.shape[0], C.shape[0], B.shape[1], len(unknown)
-    I, zero = np.eye(p), np.zeros
+    one, zero = np.eye(p), np.zeros
     system_A = np.block([
         [N, zero((n, 2 * p))],
-        [zero((p, n)), -I / tau, zero((p, p))],
-        [C @ A / tau, zero((p, p)), -I / tau],
+        [zero((p, n)), -one / tau, zero((p, p))],
+        [C @ A / tau, zero((p, p)), -one / tau],
     ])  # fmt: skip
-    system_B = np.block([[L, G], [I / tau, zero((p, m))], [-C @ A @ E / tau, C @ B / tau]])
+    system_B = np.block([[L, G], [one / tau, zero((p, m))], [-C @ A @ E / tau, C @ B / tau]])
     system_C = np.block([[np.eye(n), zero((n, 2 * p))], [zero((k, n)), -inverse / tau, -inverse]])
     system_D = np.block([[-E, zero((n, m))], [inverse / tau, zero((k, m))]])
     names = tuple(f"z_{s}" for s in model.states)

@@ -34,7 +34,7 @@ class SmoothedEstimate(Estimate):
         judged = ticks - unsettled > SECOND / self.grid.dt
         columns = dict(self.columns)
         for row in self.innovations:
-            columns[f"{row.row}_used"] = row.used * judged
+            columns[f"{row.row}_used"] = (row.used & judged).astype(np.float64)
         return check_estimate(columns, self.outputs, self.grid, self.measured, self.log, self._knob())
 
 
