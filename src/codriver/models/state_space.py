@@ -40,6 +40,23 @@ class StateSpace:
         """exp(A dt), shape (n, n)."""
         return matrix_exponential(self.A * dt)
 
+    def input_maps(self, dt: float) -> tuple[Array, Array]:
+        """What inputs do over a tick if they run straight between ticks: x_k = F x_{k-1} + G0 u_{k-1} + G1 u_k.
+
+        Of exp of [[A, B, 0], [0, 0, I / dt], [0, 0, 0]] dt, the first row is [F, G0 + G1, G1]. An input that is held over the
+        tick does (G0 + G1) u_{k-1}.
+
+        Returns:
+            G0 and G1, shape (n, m) each.
+        """
+        n, m = self.B.shape
+        block = np.zeros((n + 2 * m, n + 2 * m))
+        block[:n, :n], block[:n, n : n + m] = self.A * dt, self.B * dt
+        block[n : n + m, n + m :] = np.eye(m)
+        exponential = matrix_exponential(block)
+        held, late = exponential[:n, n : n + m], exponential[:n, n + m :]
+        return held - late, late
+
     def process_noise(self, Q: Array, dt: float) -> Array:
         """Covariance that white process noise of intensity Q gathers in dt: the integral of exp(A s) Q exp(A' s) ds.
 

@@ -31,7 +31,7 @@ def predict_covariance(P: Matrix, F: Array | Matrix, Q: Array | Matrix) -> Matri
 
 def predict_mean(x: Sequence[Scalar], F: Array | Matrix) -> list[Scalar]:
     """F x, for F of numbers or scalars."""
-    return [_dot([(F[i][k], x[k]) for k in range(len(x))]) for i in range(len(x))]
+    return [_dot([(F[i][k], x[k]) for k in range(len(x))]) for i in range(len(F))]
 
 
 def update_row(
