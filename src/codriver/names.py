@@ -64,6 +64,7 @@ _ENTRIES = (
     Quantity("roll_rate", "rad/s", "deg/s", "p", "rotation about x, positive when the right side goes down", -7, 7),
     Quantity("pitch_rate", "rad/s", "deg/s", "q", "rotation about y, positive when the nose goes down", -7, 7),
     Quantity("roll_angle", "rad", "deg", "phi", "positive when leaning to the right", -pi / 2, pi / 2),
+    Quantity("roll_acceleration", "rad/s^2", "rad/s^2", "p'", "time derivative of roll_rate"),
     Quantity("distance", "m", "m", "s", "distance travelled, the papers' curvilinear coordinate", -1e3, 1e7),
     Quantity("latitude", "deg", "deg", "lat", "north positive", -90, 90),
     Quantity("longitude", "deg", "deg", "lon", "east positive", -180, 180),

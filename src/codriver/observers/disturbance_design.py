@@ -125,5 +125,7 @@ def _certify(F: Array, left: Array, dt: float, unknown: tuple[str, ...]) -> Cert
         f"the error decays with {decay:.4g} 1/s or quicker where every tick has its measurements",
     )
     if not stable(poles):
-        raise DesignError(f"the filter fails its certificate: {'; '.join(claims)}", "a stable filter", "correct the noises")
+        raise DesignError(
+            f"the filter fails its certificate: {'; '.join(claims)}", "a stable filter", "correct the noises"
+        )
     return Certificate(True, claims, continuous, poles, decay)
