@@ -27,7 +27,7 @@ from codriver.finding import Finding
 from codriver.identify.standard_errors import block_length, newey_west
 from codriver.identify.steering_record import mend_angle
 from codriver.models.bicycle import GRAVITY
-from codriver.models.steer_row import SteerMotion, SteerRow
+from codriver.models.steer_row import SteerMotion, SteerRow, sliding
 from codriver.signals import Log, Signal
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
@@ -39,6 +39,7 @@ SETTLES = 1.0  # s at both ends of a record, where the low-pass is not itself
 SLOWEST = 0.5  # m/s: below it a bicycle is pushed or lies
 WORST = 0.5  # greatest standard error of M_dd, of itself
 FASTEST = 10.0  # rad/s: a fork that turns quicker is an encoder that jumps; a fall showed 5.4
+QUICKER = 4.0  # the rate that friction looks at passes so many times `band`
 TOO_ALIKE = 1e6  # condition of the columns, each scaled to 1
 WAYS = ("acceleration", "torque")
 
@@ -102,8 +103,10 @@ def steer_record(
     absent = [name for name in wanted if name not in log]
     if absent:
         raise MissingSignal(f"the log lacks {', '.join(absent)}", f"{', '.join(wanted)}", "map them in the names file")
-    angle, _, findings = mend_angle(log["steer_angle"])
+    angle, jumps, findings = mend_angle(log["steer_angle"])
     angle, told = _longest_run(angle)
+    if jumps.size:
+        findings = findings[:-1]  # that of the jumps, which is told below with what is done about it
     log = log.with_signals(angle)
     grid = log.sample(wanted, dt)
     there = np.all([grid.held[name] for name in wanted], axis=0)
@@ -111,10 +114,13 @@ def steer_record(
     values = {name: np.nan_to_num(grid.values[name]) for name in wanted}
     soft = {name: sosfiltfilt(sos, x) for name, x in values.items()}
     steer_rate = np.gradient(soft["steer_angle"], dt)
+    quick = sosfiltfilt(butter(2, min(QUICKER * band, 0.4 / dt), fs=1 / dt, output="sos"), values["steer_angle"])
+    slides = sosfiltfilt(sos, sliding(np.gradient(quick, dt)))
     speed = values["longitudinal_speed"]
     motion = SteerMotion(
         roll=soft["roll_angle"], roll_rate=soft["roll_rate"], roll_acceleration=np.gradient(soft["roll_rate"], dt),
-        steer=soft["steer_angle"], steer_rate=steer_rate, steer_acceleration=np.gradient(steer_rate, dt), speed=speed,
+        steer=soft["steer_angle"], steer_rate=steer_rate, steer_acceleration=np.gradient(steer_rate, dt),
+        sliding=slides, speed=speed,
     )  # fmt: skip
     torque = np.full(speed.size, np.nan)
     if known_torque:

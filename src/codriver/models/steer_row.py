@@ -77,7 +77,7 @@ class SteerRow:
         Args:
             steer_rate: rad/s.
         """
-        return np.asarray(self.friction * np.tanh(steer_rate / SLIDING) + self.offset)
+        return np.asarray(self.friction * sliding(steer_rate) + self.offset)
 
     def model(self, speed: float) -> StateSpace:
         """Fork at a speed, without friction: unknown rider torque, known roll; the steer angle is measured.
@@ -103,9 +103,19 @@ class SteerRow:
         )
 
 
+def sliding(steer_rate: Array) -> Array:
+    """f of a rate in rad/s: the share of T_c that acts, from -1 to 1."""
+    return np.asarray(np.tanh(steer_rate / SLIDING))
+
+
 @dataclass(frozen=True, eq=False)
 class SteerMotion:
-    """What a bicycle does, arrays of one length: angles in rad, their rates and accelerations, speed in m/s."""
+    """What a bicycle does, arrays of one length: angles in rad, their rates and accelerations, speed in m/s.
+
+    Attributes:
+        sliding: f(delta'), from -1 to 1. Where the others are filtered it is the filtered f, not f of the filtered rate, which
+            would round off the turning points and take a third of the friction away.
+    """
 
     roll: Array
     roll_rate: Array
@@ -113,6 +123,7 @@ class SteerMotion:
     steer: Array
     steer_rate: Array
     steer_acceleration: Array
+    sliding: Array
     speed: Array
 
     def columns(self, g: float) -> dict[str, Array]:
@@ -126,6 +137,6 @@ class SteerMotion:
             "K0_dphi": g * self.roll,
             "K0_dd": g * self.steer,
             "K2_dd": v**2 * self.steer,
-            "friction": np.tanh(self.steer_rate / SLIDING),
+            "friction": self.sliding,
             "offset": np.ones_like(v),
         }
