@@ -192,6 +192,11 @@ class CsvRecording(TableRecording):
         if bad:
             self._tell(
                 f"{counted(len(bad), 'row', 'has', 'have')} too few or too many cells; left out, the first: '{bad[0][:60]}'"
+                + (
+                    ""
+                    if self._clock
+                    else f"; without a time column all rows behind come {1 / (self._rate or 1):g} s early for each"
+                )
             )
         return table
 
