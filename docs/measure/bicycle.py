@@ -232,12 +232,23 @@ def ride_of_davis() -> None:
                 print(f"| causal, judged on the {name}, {label} | {shifted(*causal(part, chosen, v, 0.005), 0.005)} |")
     print()
     table(rows)
-    print("\nwith both rows, the measured bicycle: R2 of the torque, mean taken out, at", SHIFTS)
-    for label, unknown, known in (
-        ("pull known", ("rider_torque",), True),
-        ("pull unknown", ("rider_torque", "roll_moment"), False),
-    ):
-        print(f"| {label} | {shifted(*both_rows(ride, own, v, unknown, known), 0.005)} |")
+    print("\nthe measured bicycle, whole ride, mean taken out: R2 at", SHIFTS)
+    for label, chosen in (("steer row", row), ("steer row, friction", row.with_values(friction=0.38))):
+        found, truth = causal(ride, chosen, v, 0.005)
+        print(f"| {label} | {shifted(found - found.mean() + truth.mean(), truth, 0.005)} |")
+    for label, known in (("both rows, pull known", True), ("both rows, pull unknown", False)):
+        print(f"| {label} | {shifted(*both_rows(ride, own, v, known), 0.005)} |")
+    whole = steer_record(ride, 0.005)
+    M, C, K = own.at(v)
+    m, pull = whole.motion, 0.94 * judged_pull(ride, (0, 60))
+    moment = (
+        M[0] @ [m.roll_acceleration, m.steer_acceleration]
+        + C[0] @ [m.roll_rate, m.steer_rate]
+        + K[0] @ [m.roll, m.steer]
+    )
+    pull, moment = pull[whole.used], moment[whole.used]
+    slope = pull @ moment / (pull @ pull)
+    print(f"roll row against the pull's moment: correlation {np.corrcoef(pull, moment)[0, 1]:.2f}, slope {slope:.2f}")
 
 
 def judged_pull(ride: cd.Log, ends: tuple[int, int]) -> np.ndarray:
@@ -248,15 +259,13 @@ def judged_pull(ride: cd.Log, ends: tuple[int, int]) -> np.ndarray:
     return np.asarray(sosfiltfilt(butter(2, 5.0, fs=200.0, output="sos"), force))
 
 
-def both_rows(
-    ride: cd.Log, own: BicycleMatrices, v: float, unknown: tuple[str, ...], known: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """The torque by roll and steer row together, the pull on the rope known or not."""
-    noise = [10.0**2] if known else [10.0**2, 300.0**2]
-    model = bicycle_model(own, v)
+def both_rows(ride: cd.Log, own: BicycleMatrices, v: float, known: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The torque by roll and steer row together, the pull on the rope known or not; noises as serve this ride best."""
+    unknown = ("rider_torque",) if known else ("rider_torque", "roll_moment")
+    noise, roll, angle = ([3.0**2], 20.0, 0.1) if known else ([10.0**2, 3000.0**2], 0.1, 3e-3)
     design = design_disturbance_filter(
-        model, unknown, 0.005, unknown_noise=noise, output_noise=[1e-2**2, 1e-3**2, 3e-2**2, 3e-2**2],
-        state_noise=[0, 0, 0.3**2, 0.5**2],
+        bicycle_model(own, v), unknown, 0.005, unknown_noise=noise, output_noise=[angle**2, 1e-3**2, 3e-2**2, 3e-2**2],
+        state_noise=[0, 0, roll**2, 0.5**2],
     )  # fmt: skip
     steer = ride["steer_angle"]
     ride = ride.with_signals(cd.Signal("steer_rate", steer.time, np.gradient(steer.values, steer.time), "rad/s"))
