@@ -16,6 +16,7 @@ def info(
     """Say what a log holds, which estimators it can feed, what is missing, and which is the best available."""
     from codriver.cli.options import check_inputs
     from codriver.logs import open_recording
+    from codriver.logs.names_file import load_names
     from codriver.logs.propose import propose_names
     from codriver.logs.read import own_names, read_recording
     from codriver.observers.feed import best, feeds, least_demanding
@@ -26,14 +27,15 @@ def info(
 
     check_inputs(log, dbc, names)
     car = load_vehicle(vehicle) if vehicle is not None else None
-    recording = open_recording(log, dbc=dbc, bus=bus)
+    mapping = load_names(names) if names is not None else None
+    recording = open_recording(log, dbc=dbc, bus=bus, rate=mapping.rate if mapping is not None else None)
     channels = recording.channels()
     begins = None
-    if names is None and recording.default_names is None and not own_names(recording).entries:
+    if mapping is None and recording.default_names is None and not own_names(recording).entries:
         signals = Log({}, str(log), tuple(recording.faults), tuple(sorted(channels)))  # nothing is mapped yet
         begins = propose_names(recording)
     else:
-        signals = read_recording(recording, names)
+        signals = read_recording(recording, mapping)
     # Without a vehicle, say what the log alone allows: parameters are told apart from signals.
     found = feeds(signals, car)
     by_family = {family: [f for f in found if f.family == family] for family in families()}
