@@ -6,20 +6,21 @@
     motor      T_aln = steering_motor_torque                          a force-feedback wheel: the motor is all that acts
     command    T_aln = torque_scale T_com + torque_offset             the same, in the device's own unit (89)
 
-Friction is Dahl's: its state z runs towards the direction of motion within the presliding angle d, so a wheel that rests keeps
-the torque it came to rest with, and nothing chatters when an encoder's last digit does:
+Friction is Dahl's: its state z runs towards the direction of motion within the presliding angle d, so nothing chatters when an
+encoder's last digit does:
 
-    z <- sgn + (z - sgn) exp(-|Delta delta| / d),   T_f = T_c z
+    z <- sgn + (z - sgn) exp(-|Delta delta| / d) while it moves,   z <- z exp(-dt / REST) while it rests,   T_f = T_c z
 
-A wheel that sticks can hold any torque up to T_c: the variance of T_f is T_c^2 (1 - z^2) / 3 + (sd of T_c)^2 z^2, that of a
-uniform torque where z = 0. Dahl 1968 (Aerospace Corporation, TOR-0158(3107-18)-1).
+A wheel that sticks can hold any torque up to T_c, and what it holds soon has nothing to do with how it came to rest: so z fades, and
+the variance of T_f is T_c^2 (1 - z^2) / 3 + (sd of T_c)^2 z^2, that of a uniform torque where z = 0. REST is from simulated drivers:
+docs/driver-torque.md. Dahl 1968 (Aerospace Corporation, TOR-0158(3107-18)-1).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import pi
+from math import exp, pi
 from typing import Any
 
 from codriver.kernel import Scalar, select
@@ -28,6 +29,7 @@ from codriver.vehicles import Vehicle
 
 PRESLIDING = 0.2 * pi / 180  # rad, where the vehicle file says nothing
 FRICTION_SD = 0.1  # of T_c, where the vehicle file says nothing
+REST = 0.5  # s, in which a resting wheel forgets how it came to rest
 
 
 @dataclass(frozen=True)
@@ -67,18 +69,19 @@ class Column:
     optional: frozenset[str] = frozenset()
 
 
-def logged_column(vehicle: Vehicle, name: str = "alignment_torque") -> Column:
+def logged_column(vehicle: Vehicle, dt: float, name: str = "alignment_torque") -> Column:
     """The torque that the log holds under a name, less friction.
 
     Args:
         vehicle: with steering_friction, if there is friction; with torque_scale for `steering_motor_command`.
+        dt: tick, s.
         name: "alignment_torque", "steering_motor_torque" or "steering_motor_command".
     """
     scale, offset = 1.0, 0.0
     if name == "steering_motor_command":
         scale = vehicle.number("torque_scale")
         offset = vehicle.number("torque_offset") if "torque_offset" in vehicle else 0.0
-    rubbing = friction_of(vehicle)
+    rubbing = friction_of(vehicle, dt)
 
     def at(carry: Scalars, u: Scalars, ok: Scalars, angle: Scalar, moved: Scalar) -> Moment:
         there = ok[name]
@@ -97,11 +100,13 @@ class Friction:
         level: T_c, N m.
         sd: of T_c, N m.
         width: presliding angle d, rad.
+        keep: what is left of z after a tick at rest.
     """
 
     level: float
     sd: float
     width: float
+    keep: float
 
     def at(self, z: Scalar, moved: Scalar) -> tuple[Scalar, Scalar, Scalar]:
         """The new state, the torque against the motion (N m) and its variance, after the wheel moved by so much (rad)."""
@@ -109,7 +114,8 @@ class Friction:
             return z, 0.0, 0.0
         size = select(moved < 0, -moved, moved)
         direction = select(moved < 0, -1.0, 1.0)
-        new = direction + (z - direction) * _exponential(-size / self.width)
+        moving = direction + (z - direction) * _exponential(-size / self.width)
+        new = select(size > 0, moving, self.keep * z)
         square = new * new
         spread = self.level**2 / 3.0
         return new, self.level * new, spread * (1.0 - square) + self.sd**2 * square
@@ -120,20 +126,18 @@ class Friction:
         return {"friction": self.level} if self.level else {}
 
 
-def friction_of(vehicle: Vehicle) -> Friction:
-    """The friction of a vehicle file; none where it has none."""
+def friction_of(vehicle: Vehicle, dt: float) -> Friction:
+    """The friction of a vehicle file, for a tick, s; none where it has none."""
     level = vehicle.number("steering_friction") if "steering_friction" in vehicle else 0.0
     given = vehicle.parameters["steering_friction"].sd if level else None
     sd = float(given) if isinstance(given, (int, float)) else FRICTION_SD * level
     width = vehicle.number("steering_presliding") if "steering_presliding" in vehicle else PRESLIDING
-    return Friction(level, sd, width)
+    return Friction(level, sd, width, exp(-dt / REST))
 
 
 def _exponential(x: Any) -> Any:
     """exp, of a number or a symbol."""
     if isinstance(x, (int, float)):
-        from math import exp
-
         return exp(x)
     import casadi
 

@@ -32,6 +32,7 @@ from codriver.observers.torque_noise import TorqueNoise, find_torque_noise
 from codriver.vehicles import Vehicle
 
 FAMILY = "driver-torque"
+Source = Callable[[Vehicle, float], Column]  # of a vehicle, for a tick
 WHEEL = ("steering_inertia", "steering_damping")
 DEGREES = 180 / pi
 
@@ -99,13 +100,13 @@ def wheel_pi_design(inertia: float, damping: float, weights: PIWeights) -> PIDes
     return design_pi_observer(wheel_in_degrees(inertia, damping), ("driver_torque",), weights.V_1, weights.V_2)
 
 
-def _kalman(name: str, source: Callable[[Vehicle], Column]) -> Callable[[Vehicle | None, Design], Observer]:
+def _kalman(name: str, source: Source) -> Callable[[Vehicle | None, Design], Observer]:
     """How a Kalman filter with this source is built."""
 
     def build(vehicle: Vehicle | None, design: Design) -> Observer:
         assert vehicle is not None  # the registry saw to it, for the estimator has parameters
         assert isinstance(design.preset, TorqueNoise)
-        return driver_torque_observer(vehicle, source(vehicle), design.preset, design.dt, name)
+        return driver_torque_observer(vehicle, source(vehicle, design.dt), design.preset, design.dt, name)
 
     return build
 
@@ -118,12 +119,12 @@ def _pi(vehicle: Vehicle | None, design: Design) -> Observer:
     return pi_observer(made, design.dt, scales=[DEGREES], inputs=weights.inputs, settings=settings)
 
 
-def _logged(name: str) -> Callable[[Vehicle], Column]:
-    return lambda vehicle: logged_column(vehicle, name)
+def _logged(name: str) -> Source:
+    return lambda vehicle, dt: logged_column(vehicle, dt, name)
 
 
 def _register(
-    name: str, parameters: tuple[str, ...], signal: str, meaning: str, source: Callable[[Vehicle], Column]
+    name: str, parameters: tuple[str, ...], signal: str, meaning: str, source: Source
 ) -> None:
     """A Kalman filter of the family."""
     register(Estimator(
