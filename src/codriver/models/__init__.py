@@ -1,7 +1,9 @@
 """Plants: one a file; what observers are designed on."""
 
+from codriver.models.alignment import AlignmentModel
 from codriver.models.longitudinal import intention_model
+from codriver.models.single_track import SingleTrack
 from codriver.models.state_space import StateSpace
 from codriver.models.steering import steering_model
 
-__all__ = ["StateSpace", "intention_model", "steering_model"]
+__all__ = ["AlignmentModel", "SingleTrack", "StateSpace", "intention_model", "steering_model"]
