@@ -1,8 +1,11 @@
 """The torque balance of two recorded columns: a car whose assistant steers (comma2k19), and a simulator's (iRacing).
 
-    assist     T_dr = load - T_m,   load = c_0 + c_1 delta + c_2 v^2 delta + c_3 v r + c_4 delta' + c_5 tanh(delta' / (1 deg/s)) + c_6 delta''
-    shaft      T_aln = K (beta + l_f r / v - delta_s / g_s)                                     2019 eq. (92)
-               T_aln = K a / 3 (1 - (1 - |alpha| / a)^3) sgn alpha,  alpha of the bracket       brush tyre, sliding from a on
+Driver torque in the car, and shaft torque in the simulator, 2019 eq. (92), the second for a brush tyre that slides from a on:
+
+    T_dr  = load - T_m
+    load  = c_0 + (c_1 + c_2 v^2) delta + c_3 v r + c_4 delta' + c_5 tanh(delta' / (1 deg/s)) + c_6 delta''
+    T_aln = K alpha,                                                    alpha = beta + l_f r / v - delta_s / g_s
+    T_aln = K a / 3 (1 - (1 - |alpha| / a)^3) sgn alpha
 """
 
 from __future__ import annotations

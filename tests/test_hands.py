@@ -113,7 +113,8 @@ class TestFilter:
         check_observer(chained(HandsSetting()))
 
     @pytest.mark.parametrize(
-        "wrong", [{"floor": 0.0}, {"on_dwell": -1.0}, {"off_dwell": inf}, {"pulling_first": 1.5}, {"correlation": np.nan}]
+        "wrong",
+        [{"floor": 0.0}, {"on_dwell": -1.0}, {"off_dwell": inf}, {"pulling_first": 1.5}, {"correlation": np.nan}],
     )
     def test_what_cannot_be_is_refused(self, wrong):
         with pytest.raises(UsageError, match=next(iter(wrong))):
@@ -143,7 +144,14 @@ class TestCalibration:
         return s.floor * noise[0] + spread * noise[1], (states > 0).astype(float)
 
     QUICK = HandsSettings(
-        off_dwell=5, on_dwell=6, quiet_dwell=2, pulling_dwell=2, share=1, floor=0.1, quiet_torque=0.02, pulling_torque=0.3
+        off_dwell=5,
+        on_dwell=6,
+        quiet_dwell=2,
+        pulling_dwell=2,
+        share=1,
+        floor=0.1,
+        quiet_torque=0.02,
+        pulling_torque=0.3,
     )
 
     def judged(self, assumed: float, true: float):
@@ -214,8 +222,9 @@ class TestSimulated:
         np.testing.assert_array_equal(truth["hands_on"].values, d.state[2] != OFF)
 
     def test_a_drive_is_that_of_its_seed(self):
-        one, two = simulate_hands(replace(self.SHORT, seconds=20.0), drives=1), simulate_hands(
-            replace(self.SHORT, seconds=20.0), drives=2
+        one, two = (
+            simulate_hands(replace(self.SHORT, seconds=20.0), drives=1),
+            simulate_hands(replace(self.SHORT, seconds=20.0), drives=2),
         )
         np.testing.assert_array_equal(one.measured[0], two.measured[0])
         assert not np.array_equal(two.measured[0], two.measured[1])

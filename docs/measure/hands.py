@@ -1,6 +1,6 @@
 """Figures of docs/hands.md: python docs/measure/hands.py [DRIVES]      10 min each; 12 drives a row by default
 
-python docs/measure/hands.py fit          finds the defaults of HandsSettings again, on drives of other seeds; some 10 min
+python docs/measure/hands.py fit          finds the defaults of HandsSettings again, on drives of other seeds; some minutes
 python docs/measure/hands.py recorded     the two recorded columns
 """
 
@@ -29,9 +29,7 @@ from codriver.simulate.judge_hands import HandsJudged, judge_hands
 
 DT = 0.01
 WALKS = (1.0, 3.0, 8.0)  # N m per sqrt(s), of the torque observer
-FITTED = (
-    "share", "floor", "pulling_torque", "correlation", "quiet_dwell", "pulling_dwell", "on_dwell", "off_dwell",
-)  # fmt: skip
+FITTED = ("share", "floor", "pulling_torque", "correlation", "quiet_dwell", "pulling_dwell", "pulling_first")
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +68,16 @@ def loss(p: np.ndarray, on: np.ndarray) -> float:
     return judge_hands(p, on, DT).log_loss
 
 
-def fit(names: tuple[str, ...] = FITTED, start: HandsSettings | None = None, evaluations: int = 220) -> HandsSettings:
+def fit(names: tuple[str, ...] = FITTED, start: HandsSettings | None = None, evaluations: int = 170) -> HandsSettings:
     """The settings of least log loss over three torque observers, by Nelder and Mead on their logarithms."""
     start = start or HandsSettings()
     sets = [estimated(100 + k, 5, walk) for k, walk in enumerate(WALKS)]
 
     def settings(x: np.ndarray) -> HandsSettings:
-        return replace(start, **dict(zip(names, np.exp(x).tolist(), strict=True)))
+        found = dict(zip(names, np.exp(x).tolist(), strict=True))
+        if "pulling_first" in found:
+            found["pulling_first"] = min(found["pulling_first"], 1.0)
+        return replace(start, **found)
 
     x = np.log([getattr(start, name) for name in names])
     simplex = np.vstack([x, x + 0.3 * np.eye(x.size)])
@@ -91,10 +92,9 @@ def fit(names: tuple[str, ...] = FITTED, start: HandsSettings | None = None, eva
 def two_states() -> HandsSettings:
     """The filter without the state of quiet hands, fitted alike."""
     start = HandsSettings(
-        pulling_dwell=inf, pulling_first=1.0, share=0.28, floor=0.1, pulling_torque=0.24, correlation=0.5,
-        on_dwell=35.0, off_dwell=25.0,
-    )  # fmt: skip
-    return fit(("share", "floor", "pulling_torque", "correlation", "on_dwell", "off_dwell"), start, 100)
+        pulling_dwell=inf, pulling_first=1.0, share=0.28, floor=0.1, pulling_torque=0.24, correlation=0.5
+    )
+    return fit(("share", "floor", "pulling_torque", "correlation"), start, 70)
 
 
 def baselines(walk: float) -> dict[str, Callable[[Estimated], np.ndarray]]:
@@ -134,14 +134,25 @@ def baselines(walk: float) -> dict[str, Callable[[Estimated], np.ndarray]]:
 
 def row(name: str, judged: HandsJudged) -> list[str]:
     """A row of the comparison."""
-    delays = [f"{d:.1f} ({100 * m:.0f} %)" for d, m in ((judged.on_delay, judged.on_missed), (judged.off_delay, judged.off_missed))]
+    delays = [
+        f"{d:.1f} ({100 * m:.0f} %)"
+        for d, m in ((judged.on_delay, judged.on_missed), (judged.off_delay, judged.off_missed))
+    ]
     scores = [f"{x:.3f}" for x in (judged.log_loss, judged.brier, judged.calibration_error)]
     return [name, *scores, *delays, f"{judged.false_alarms:.0f}"]
 
 
 def main(drives: int) -> None:
     """Reliability, comparison, and what happens when car and driver are others."""
-    head = ["way", "log loss", "Brier", "calibration error", "on told after, s (missed)", "off told after, s (missed)", "false alarms an hour"]
+    head = [
+        "way",
+        "log loss",
+        "Brier",
+        "calibration error",
+        "on told after, s (missed)",
+        "off told after, s (missed)",
+        "false alarms an hour",
+    ]
     two = two_states()
     for walk in WALKS:
         seen = estimated(500, drives, walk)
@@ -150,7 +161,9 @@ def main(drives: int) -> None:
         full = judge_hands(seen.hands(HandsSettings()), seen.on, DT)
         print(f"\ntorque noise {walk:g} N m per sqrt(s)\n\n" + table(head, [*rows, row("hands", full)]), flush=True)
         if walk == WALKS[1]:
-            bins = [[f"{b.low:.1f} to {b.high:.1f}", *(f"{x:.3f}" for x in (b.share, b.said, b.found))] for b in full.bins]
+            bins = [
+                [f"{b.low:.1f} to {b.high:.1f}", *(f"{x:.3f}" for x in (b.share, b.said, b.found))] for b in full.bins
+            ]
             print("\n" + table(["p", "share of time", "mean p", "hands on"], bins), flush=True)
     base = HandsSetting()
     others = {
@@ -201,11 +214,16 @@ def recorded() -> None:
             "angle": regression(s, fitted, s.angle), "lateral acceleration": regression(s, fitted, s.lateral),
             "both": regression(s, fitted, s.angle, s.lateral),
         }  # fmt: skip
-        print(split, last, linear(s, fitted)[0], brush(s, fitted)[0])
-        rows += [
-            [f"{split} to {last} s", name, f"{explained(s.torque[fitted], T[fitted]):.3f}", f"{explained(s.torque[judged], T[judged]):.3f}",
-             f"{np.sqrt(np.mean((T - s.torque)[judged] ** 2)):.2f}"] for name, T in ways.items()
-        ]  # fmt: skip
+        print(
+            f"\nto {split} s: linear",
+            *np.round(linear(s, fitted)[0], 3),
+            "saturating",
+            *np.round(brush(s, fitted)[0], 3),
+        )
+        for name, T in ways.items():
+            scores = [f"{explained(s.torque[part], T[part]):.3f}" for part in (fitted, judged)]
+            rmse = np.sqrt(np.mean((T - s.torque)[judged] ** 2))
+            rows.append([f"{split} to {last} s", name, *scores, f"{rmse:.2f}"])
     print("\n" + table(["judged", "way", "R2 fitted", "R2 judged", "RMSE, N m"], rows))
 
 

@@ -1,16 +1,17 @@
 """Hands on or off the wheel, as a probability, from the estimated driver torque and its band.
 
-A hidden Markov filter with three states: hands off; hands on but quiet (they rest, or steer too little to be seen); hands that pull.
+A hidden Markov filter with three states: hands off; hands on but quiet (they rest, or steer too little to be seen); hands that
+pull.
 
     off        z ~ N(0, B),                              B = (share s)^2 + floor^2
     quiet      z ~ N(0, B + a_q^2)
     pulling    z ~ mean of N(0, B + (c a_p)^2)           c in SCALES
     hands_on = P(quiet) + P(pulling)
 
-z, N m, is the estimated torque and s its standard deviation. The band allows for a torque that changes; where there is none, z errs
-by a `share` of s only. `floor` is what z shows without hands by errors of the model (friction, alignment torque); a_q and a_p are the
-spread of the torque of quiet and of pulling hands. States change at rates of 1/dwell: over a tick the probabilities are multiplied
-by exp(G dt). Without a valid estimate nothing else happens, and they drift to their long-run shares.
+z, N m, is the estimated torque and s its standard deviation. The band allows for a torque that changes; where there is none, z
+errs by a `share` of s only. `floor` is what z shows without hands by errors of the model (friction, alignment torque); a_q and
+a_p are the spread of the torque of quiet and of pulling hands. States change at rates of 1/dwell: over a tick the probabilities
+are multiplied by exp(G dt). Without a valid estimate nothing else happens, and they drift to their long-run shares.
 
 Neighbouring samples of z err alike; taken as independent, they would push the probability to 0 or 1 within some ticks. So the
 likelihood is tempered. Of an AR(1) process with correlation time tau, n samples tell as much of the mean as n (1 - r) / (1 + r)
@@ -20,9 +21,9 @@ independent ones, r = exp(-dt / tau), and a tick counts by that factor:
 
 An exponent within f_i / f_off is cut off at `cap`, so an encoder jump alone decides nothing.
 
-Quiet hands are a state of their own because a driver who has just pulled and now does nothing is more likely quiet than gone. A filter
-of two states takes silence for "off", and is too sure of it. Where a_q is below the band, quiet and off look alike; dwell times
-alone part them, and the probability stays between 0 and 1.
+Quiet hands are a state of their own because a driver who has just pulled and now does nothing is more likely quiet than gone.
+A filter of two states takes silence for "off", and is too sure of it. Where a_q is below the band, quiet and off look alike;
+dwell times alone part them, and the probability stays between 0 and 1.
 
 HMM filter: Rabiner 1989 (Proceedings of the IEEE 77), section III.
 """
@@ -62,14 +63,14 @@ class HandsSettings:
 
     off_dwell: float = 25.0
     on_dwell: float = 35.0
-    quiet_dwell: float = 6.0
-    pulling_dwell: float = 8.0
-    pulling_first: float = 0.7
-    share: float = 0.5
-    floor: float = 0.1
-    quiet_torque: float = 0.05
-    pulling_torque: float = 1.0
-    correlation: float = 0.3
+    quiet_dwell: float = 4.0
+    pulling_dwell: float = 1.2
+    pulling_first: float = 0.25
+    share: float = 0.22
+    floor: float = 0.15
+    quiet_torque: float = 0.02
+    pulling_torque: float = 0.7
+    correlation: float = 0.02
     cap: float = 20.0
 
     def rates(self) -> Array:
@@ -101,7 +102,7 @@ def hands_observer(
     Args:
         dt: tick, s.
         settings: the defaults fit a simulated car, see docs/hands.md.
-        torque, band, valid: names of the first observer's outputs: torque and its standard deviation, N m, and whether they hold (1 or 0).
+        torque, band, valid: the first observer's outputs: torque and its standard deviation, N m, and whether they hold (1 or 0).
 
     Raises:
         UsageError: a setting or the tick is out of range.

@@ -149,7 +149,9 @@ def simulate_hands(setting: HandsSetting | None = None, *, drives: int = 1, seed
     angle, motor, driver, tyres, offset = _drive(s, state, share, wandering)
     known = factor * tyres + wandering["error"]
     measured = np.round(angle / s.resolution) * s.resolution if s.resolution > 0 else angle
-    return HandsDrives(np.arange(n) * s.dt, state, driver, motor, tyres, known, angle, measured, offset)
+    return HandsDrives(
+        np.arange(n, dtype=np.float64) * s.dt, state, driver, motor, tyres, known, angle, measured, offset
+    )
 
 
 def _drive(

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
 
 EDGES = tuple(k / 10 for k in range(11))
@@ -86,14 +87,14 @@ def judge_hands(probability: Array, hands_on: Array, dt: float) -> HandsJudged:
     )  # fmt: skip
 
 
-def _bin(k: int, there: Array, p: Array, on: Array) -> Bin:
+def _bin(k: int, there: Flags, p: Array, on: Flags) -> Bin:
     """The row of the table for these ticks."""
     if not there.any():
         return Bin(EDGES[k], EDGES[k + 1], 0.0, float("nan"), float("nan"))
     return Bin(EDGES[k], EDGES[k + 1], float(there.mean()), float(p[there].mean()), float(on[there].mean()))
 
 
-def _delays(state: Array, told: Array, dt: float) -> Array:
+def _delays(state: Flags, told: Flags, dt: float) -> Array:
     """From each time the state becomes true until it is told, s; infinite where it ends first."""
     found = []
     for is_so, said in zip(state, told, strict=True):
