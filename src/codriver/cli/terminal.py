@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
+# Of an estimate's settings, those that are told, in this order.
+SETTINGS = ("vehicle", "known_torque", "ell", "preset", "order", "form", "smoother")
 _STYLE = {"ok": "green", "warn": "yellow", "bad": "red"}
 
 
@@ -57,9 +59,7 @@ def say(summary: dict[str, Any]) -> None:
 
     out = console()
     settings = summary["settings"]
-    parts = [
-        f"{key} {_short(settings[key])}" for key in ("vehicle", "known_torque", "ell", "preset", "order", "form", "smoother") if key in settings
-    ]
+    parts = [f"{key} {_short(settings[key])}" for key in SETTINGS if key in settings]
     out.print(
         f"[bold]{summary['estimator']}[/] on {escape(summary['log'])}" + (f": {', '.join(parts)}" if parts else "")
     )

@@ -5,15 +5,18 @@
     logged     T_aln = alignment_torque                               a simulator's log
     motor      T_aln = steering_motor_torque                          a force-feedback wheel: the motor is all that acts
     command    T_aln = torque_scale T_com + torque_offset             the same, in the device's own unit (89)
+    map        T_aln of `models.alignment`, from angle and speed      a car: tyres less assist, as hands feel them
+    track      (92) with a single track, from angle and speed         a car whose tyres are known
 
-Friction is Dahl's: its state z runs towards the direction of motion within the presliding angle d, so nothing chatters when an
-encoder's last digit does:
+Friction of the first three is Dahl's: its state z runs towards the direction of motion within the angle w, so nothing chatters when
+an encoder's last digit does:
 
-    z <- sgn + (z - sgn) exp(-|Delta delta| / d) while it moves,   z <- z exp(-dt / REST) while it rests,   T_f = T_c z
+    z <- (z + m / w) / (1 + |m| / w) when the wheel moves by m,   z <- z exp(-dt / REST) while it rests,   T_f = T_c z
 
-A wheel that sticks can hold any torque up to T_c, and what it holds soon has nothing to do with how it came to rest: so z fades, and
-the variance of T_f is T_c^2 (1 - z^2) / 3 + (sd of T_c)^2 z^2, that of a uniform torque where z = 0. REST is from simulated drivers:
-docs/driver-torque.md. Dahl 1968 (Aerospace Corporation, TOR-0158(3107-18)-1).
+A wheel that sticks can hold any torque up to T_c, and what it holds soon has nothing to do with how it came to rest: so z
+fades, and the variance of T_f is T_c^2 (1 - z^2) / 3 + (sd of T_c)^2 z^2, that of a uniform torque where z = 0. REST is from
+simulated drivers: docs/driver-torque.md. A car's map has its own friction, and its error is known as a whole, from drives it was not fitted to.
+Dahl 1968 (Aerospace Corporation, TOR-0158(3107-18)-1).
 """
 
 from __future__ import annotations
@@ -21,13 +24,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import exp, pi
-from typing import Any
 
 from codriver.kernel import Scalar, select
+from codriver.models.alignment import AlignmentModel
 from codriver.observers.observer import Scalars
 from codriver.vehicles import Vehicle
 
-PRESLIDING = 0.2 * pi / 180  # rad, where the vehicle file says nothing
+WIDTH = 0.2 * pi / 180  # rad, where the vehicle file says nothing
 FRICTION_SD = 0.1  # of T_c, where the vehicle file says nothing
 REST = 0.5  # s, in which a resting wheel forgets how it came to rest
 
@@ -60,6 +63,7 @@ class Column:
             sample, 0 on ticks without one.
         settings: for provenance.
         optional: those of the inputs that need not be there.
+        error: standard deviation of the torque's error that stays for long, N m.
     """
 
     inputs: tuple[str, ...]
@@ -67,6 +71,7 @@ class Column:
     at: Callable[[Scalars, Scalars, Scalars, Scalar, Scalar], Moment]
     settings: Mapping[str, str | float]
     optional: frozenset[str] = frozenset()
+    error: float = 0.0
 
 
 def logged_column(vehicle: Vehicle, dt: float, name: str = "alignment_torque") -> Column:
@@ -99,7 +104,7 @@ class Friction:
     Attributes:
         level: T_c, N m.
         sd: of T_c, N m.
-        width: presliding angle d, rad.
+        width: w, rad.
         keep: what is left of z after a tick at rest.
     """
 
@@ -112,10 +117,8 @@ class Friction:
         """The new state, the torque against the motion (N m) and its variance, after the wheel moved by so much (rad)."""
         if self.level == 0:
             return z, 0.0, 0.0
-        size = select(moved < 0, -moved, moved)
-        direction = select(moved < 0, -1.0, 1.0)
-        moving = direction + (z - direction) * _exponential(-size / self.width)
-        new = select(size > 0, moving, self.keep * z)
+        size = select(moved < 0, -moved, moved) / self.width
+        new = select(size > 0, (z + moved / self.width) / (1.0 + size), self.keep * z)
         square = new * new
         spread = self.level**2 / 3.0
         return new, self.level * new, spread * (1.0 - square) + self.sd**2 * square
@@ -131,14 +134,61 @@ def friction_of(vehicle: Vehicle, dt: float) -> Friction:
     level = vehicle.number("steering_friction") if "steering_friction" in vehicle else 0.0
     given = vehicle.parameters["steering_friction"].sd if level else None
     sd = float(given) if isinstance(given, (int, float)) else FRICTION_SD * level
-    width = vehicle.number("steering_presliding") if "steering_presliding" in vehicle else PRESLIDING
+    name = "steering_friction_width"
+    width = vehicle.number(name) if name in vehicle else WIDTH
     return Friction(level, sd, width, exp(-dt / REST))
 
 
-def _exponential(x: Any) -> Any:
-    """exp, of a number or a symbol."""
-    if isinstance(x, (int, float)):
-        return exp(x)
-    import casadi
+def car_column(vehicle: Vehicle, dt: float) -> Column:
+    """The torque of a car's tyres less its assist, from angle and speed, by the map that `codriver identify alignment` found.
 
-    return casadi.exp(x)
+    Args:
+        vehicle: with alignment_gain; alignment_torque_sd is the map's error, N m, friction and all.
+        dt: tick, s.
+    """
+    model = AlignmentModel.from_vehicle(vehicle)
+    error = vehicle.number("alignment_torque_sd") if "alignment_torque_sd" in vehicle else 0.0
+
+    def at(carry: Scalars, u: Scalars, ok: Scalars, angle: Scalar, moved: Scalar) -> Moment:
+        torque, states, there = _mapped(model, carry, u, ok, angle, dt)
+        return Moment(torque - model.coulomb * states["map_presliding"], error**2, there, states)
+
+    return Column(
+        ("longitudinal_speed",), _map_carry(model), at, {"known_torque": "map of angle and speed"}, error=error
+    )
+
+
+def single_track_column(vehicle: Vehicle, dt: float) -> Column:
+    """The tyres' torque by eq. (92), sideslip and yaw rate by a single track, from angle and speed.
+
+    Args:
+        vehicle: with alignment_stiffness and the parameters of `SingleTrack`; alignment_torque_sd is its error, N m.
+        dt: tick, s.
+    """
+    model, rubbing = AlignmentModel.eq_92(vehicle), friction_of(vehicle, dt)
+    error = vehicle.number("alignment_torque_sd") if "alignment_torque_sd" in vehicle else 0.0
+
+    def at(carry: Scalars, u: Scalars, ok: Scalars, angle: Scalar, moved: Scalar) -> Moment:
+        torque, states, there = _mapped(model, carry, u, ok, angle, dt)
+        z, against, spread = rubbing.at(carry["bristle"], moved)
+        return Moment(torque - against, error**2 + spread, there, {**states, "bristle": z})
+
+    settings = {"known_torque": "eq. (92), single track", **rubbing.settings}
+    return Column(("longitudinal_speed",), {**_map_carry(model), "bristle": 0.0}, at, settings, error=error)
+
+
+def _map_carry(model: AlignmentModel) -> dict[str, float]:
+    """The carried scalars of a map."""
+    return {f"map_{name}": value for name, value in model.states.items()}
+
+
+def _mapped(
+    model: AlignmentModel, carry: Scalars, u: Scalars, ok: Scalars, angle: Scalar, dt: float
+) -> tuple[Scalar, Scalars, Scalar]:
+    """Torque of a map, its new carry, and whether the speed is there; without speed it stays as it was."""
+    there = ok["longitudinal_speed"]
+    speed = select(there, u["longitudinal_speed"], 0.0)
+    before = {name: carry[f"map_{name}"] for name in model.states}
+    states = model.advance(before, angle, speed, dt)
+    memory = {f"map_{name}": select(there, states[name], before[name]) for name in model.states}
+    return model.torque(states, angle, speed), memory, there

@@ -3,9 +3,14 @@
 | name                  | what else acts on the column                       | how                          |
 |-----------------------|----------------------------------------------------|------------------------------|
 | driver-torque-logged  | the log's alignment_torque                         | Kalman filter, with bands    |
+| driver-torque-car     | a map of angle and speed, identified from drives   | the same                     |
+| driver-torque-single-track | eq. (92) with a single track, from angle and speed | the same                |
 | driver-torque-motor   | steering_motor_torque: the motor of a simulator    | the same                     |
 | driver-torque-command | the motor's command, by torque_scale               | the same                     |
 | driver-torque-pi      | the log's alignment_torque                         | PI observer of the 2019 paper, no bands |
+
+Behind each Kalman filter runs the one that tells whether hands are on the wheel (`hands`); what the map of a car errs by without
+hands is its alignment_torque_sd.
 
 Presets of the Kalman filters are a `TorqueNoise`; without one, a run over a log fits it to that log. Those of the PI observer are
 weights V_1 and V_2, in the paper's degrees. Okamoto, Tsiotras 2019 (Robotics and Autonomous Systems), sections 3 and 4.
@@ -14,7 +19,7 @@ weights V_1 and V_2, in the paper's degrees. Okamoto, Tsiotras 2019 (Robotics an
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
 
@@ -22,9 +27,10 @@ from codriver.errors import UsageError
 from codriver.models import StateSpace
 from codriver.models.steering import steering_model
 from codriver.names import nearest
-from codriver.observers.column import Column, logged_column
+from codriver.observers.column import Column, car_column, logged_column, single_track_column
 from codriver.observers.driver_torque import driver_torque_observer
-from codriver.observers.observer import Observer
+from codriver.observers.hands import HandsSettings, hands_observer
+from codriver.observers.observer import Observer, chain
 from codriver.observers.pi import pi_observer
 from codriver.observers.pi_design import PIDesign, design_pi_observer
 from codriver.observers.registry import Design, Estimator, register
@@ -34,6 +40,10 @@ from codriver.vehicles import Vehicle
 FAMILY = "driver-torque"
 Source = Callable[[Vehicle, float], Column]  # of a vehicle, for a tick
 WHEEL = ("steering_inertia", "steering_damping")
+SINGLE_TRACK = (
+    "steering_ratio", "mass", "yaw_inertia", "wheelbase", "front_axle_distance", "front_cornering_stiffness",
+    "rear_cornering_stiffness",
+)  # fmt: skip
 DEGREES = 180 / pi
 
 
@@ -106,7 +116,12 @@ def _kalman(name: str, source: Source) -> Callable[[Vehicle | None, Design], Obs
     def build(vehicle: Vehicle | None, design: Design) -> Observer:
         assert vehicle is not None  # the registry saw to it, for the estimator has parameters
         assert isinstance(design.preset, TorqueNoise)
-        return driver_torque_observer(vehicle, source(vehicle, design.dt), design.preset, design.dt, name)
+        column = source(vehicle, design.dt)
+        torque = driver_torque_observer(vehicle, column, design.preset, design.dt, name)
+        settings = HandsSettings()
+        return chain(
+            torque, hands_observer(design.dt, replace(settings, floor=max(settings.floor, column.error))), name
+        )
 
     return build
 
@@ -123,9 +138,7 @@ def _logged(name: str) -> Source:
     return lambda vehicle, dt: logged_column(vehicle, dt, name)
 
 
-def _register(
-    name: str, parameters: tuple[str, ...], signal: str, meaning: str, source: Source
-) -> None:
+def _register(name: str, parameters: tuple[str, ...], signal: str, meaning: str, source: Source) -> None:
     """A Kalman filter of the family."""
     register(Estimator(
         name, parameters, ("steering_wheel_angle", signal), meaning, FAMILY, _kalman(name, source), "driver",
@@ -136,6 +149,14 @@ def _register(
 _register(
     "driver-torque-logged", WHEEL, "alignment_torque",
     "the driver's steering torque from the wheel's angle and the log's alignment torque (2019)", _logged("alignment_torque"),
+)  # fmt: skip
+_register(
+    "driver-torque-car", (*WHEEL, "alignment_gain"), "longitudinal_speed",
+    "the driver's torque as a car's sensor would show it, from the wheel's angle, speed and an identified map", car_column,
+)  # fmt: skip
+_register(
+    "driver-torque-single-track", (*WHEEL, "alignment_stiffness", *SINGLE_TRACK), "longitudinal_speed",
+    "the driver's torque from the wheel's angle, speed and a single track (2019 eq. 92)", single_track_column,
 )  # fmt: skip
 _register(
     "driver-torque-motor", WHEEL, "steering_motor_torque",

@@ -200,7 +200,10 @@ def simulate_rig(setting: RigSetting | None = None, *, seed: int = 0) -> RigDriv
     for k in range(n):
         if time[k] >= next_step:
             seen = ahead[k] / bend
-            want = car.ratio * (seen - driver.offset_gain * (y + 0.7 * car.speed * psi) - driver.heading_gain * psi) + wander[k]
+            want = (
+                car.ratio * (seen - driver.offset_gain * (y + 0.7 * car.speed * psi) - driver.heading_gain * psi)
+                + wander[k]
+            )
             next_step = time[k] + driver.step * rng.uniform(0.6, 1.4)
         aligned = back * (beta + car.front * r / car.speed - delta / car.ratio)
         # The arms bear what the tyres will ask for at the wanted angle, and pull the rest of the way.

@@ -32,9 +32,6 @@ KNOWN: dict[str, Known] = {
     "steering_inertia": Known("kg*m^2", 1e-4, 10, False, "J_s, of the steering wheel and its column (2019 eq. 27)"),
     "steering_damping": Known("N*m*s/rad", 0, 50, False, "b_s, of the steering wheel and its column (2019 eq. 27)"),
     "steering_friction": Known("N*m", 0, 50, False, "T_c, Coulomb friction of the steering column"),
-    "steering_presliding": Known(
-        "rad", 1e-5, 1, False, "d, angle within which the friction of the steering column turns round"
-    ),
     "steering_end_stop": Known("rad", 0.05, 40, False, "angle of the steering wheel at its end stops, to either side"),
     "torque_scale": Known(
         "N*m", -1e5, 1e5, False, "torque of the steering motor per unit of its command (2019 eq. 89)"
