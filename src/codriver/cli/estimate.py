@@ -202,14 +202,17 @@ def _write(result: Estimate, check: Check, out: Path, report: Path | None, comma
 
 def _told(result: Estimate, check: Check, out: Path, report: Path | None, why: str) -> dict[str, object]:
     """What the terminal shows and --json prints."""
+    from codriver.measured_torque import compare_with_sensor
     from codriver.summary import summarise, tell_findings
 
+    sensor = compare_with_sensor(result)
     return {
         "estimator": result.observer,
         "why": why,
         "settings": dict(result.provenance),
         "log": result.log.source,
         **summarise(result).to_dict(),
+        "sensor": {**vars(sensor), "text": sensor.told()} if sensor is not None else None,
         "verdict": check.verdict,
         "findings": tell_findings(check),
         "result": str(out),

@@ -68,6 +68,7 @@ def say(summary: dict[str, Any]) -> None:
     distance = f", {summary['distance_m'] / 1000:.2f} km" if summary["distance_m"] is not None else ""
     extra = f", {summary['gear_shifts']} gear shifts" if summary.get("gear_shifts") else ""
     extra += f", braking {summary['braking_share']:.0%}" if summary.get("braking_share") else ""
+    extra += f", hands on {summary['hands_on_share']:.0%}" if "hands_on_share" in summary else ""
     out.print(
         f"{summary['duration_s']:.1f} s{distance} at {summary['rate_hz']:g} Hz, valid {summary['valid_share']:.0%}{extra}\n"
     )
@@ -78,6 +79,8 @@ def say(summary: dict[str, Any]) -> None:
         numbers = [f"{row[key]:.3f}" if row[key] is not None else "-" for key in ("rms", "p5", "p95", "mean_sd")]
         table.add_row(name, str(row["unit"]), *numbers)
     out.print(table)
+    if summary["sensor"] is not None:
+        out.print(f"\n{escape(summary['sensor']['text'])}")
     out.print(f"\n[bold]verdict[/]: {summary['verdict']}")
     say_findings(out, summary["findings"])
     out.print(

@@ -15,7 +15,8 @@ an encoder's last digit does:
 
 A wheel that sticks can hold any torque up to T_c, and what it holds soon has nothing to do with how it came to rest: so z
 fades, and the variance of T_f is T_c^2 (1 - z^2) / 3 + (sd of T_c)^2 z^2, that of a uniform torque where z = 0. REST is from
-simulated drivers: docs/driver-torque.md. A car's map has its own friction, and its error is known as a whole, from drives it was not fitted to.
+simulated drivers: docs/driver-torque.md. A car's map has its own friction, and its error is known as a whole, from drives it
+was not fitted to.
 Dahl 1968 (Aerospace Corporation, TOR-0158(3107-18)-1).
 """
 
