@@ -52,7 +52,8 @@ class SensorComparison:
     def told(self) -> str:
         """A line."""
         band = "" if self.covered is None else f", {self.covered:.0%} in the 95 % band"
-        return f"against the measured {self.sensor}: RMSE {self.rmse:.3f} N m, R2 {self.r2:.3f}, mean error {self.bias:+.3f} N m{band}"
+        found = f"RMSE {self.rmse:.3f} N m, R2 {self.r2:.3f}, mean error {self.bias:+.3f} N m"
+        return f"against the measured {self.sensor}: {found}{band}"
 
 
 def compare_with_sensor(estimate: Estimate) -> SensorComparison | None:

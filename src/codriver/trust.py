@@ -154,8 +154,8 @@ def _angle(values: Mapping[str, Array], grid: Grid, log: Log) -> list[Finding]:
     findings = []
     if "angle_jump" in values and (jumps := int((values["angle_jump"] > 0.5).sum())):
         findings.append(Finding(
-            "warn", f"the angle jumps {jumps} time{'s' * (jumps > 1)}: encoder, a wrong sample, or a blow; the estimate starts anew "
-            "there", _spans(values["angle_jump"] > 0.5, grid),
+            "warn", f"the angle jumps {jumps} time{'s' * (jumps > 1)}: encoder, a wrong sample, or a blow; begun anew there",
+             _spans(values["angle_jump"] > 0.5, grid),
         ))  # fmt: skip
     if "angle_turns" in values and np.any(values["angle_turns"] != 0):
         wraps = int((np.diff(values["angle_turns"]) != 0).sum())

@@ -152,19 +152,21 @@ _register(
 )  # fmt: skip
 _register(
     "driver-torque-car", (*WHEEL, "alignment_gain"), "longitudinal_speed",
-    "the driver's steering torque as a car's sensor shows it, from the wheel's angle, speed and an identified map", car_column,
+    "the driver's steering torque from angle, speed and a map of the car identified from drives", car_column,
 )  # fmt: skip
 _register(
     "driver-torque-single-track", (*WHEEL, "alignment_stiffness", *SINGLE_TRACK), "longitudinal_speed",
-    "the driver's steering torque from the wheel's angle, speed and a single track (2019 eq. 92)", single_track_column,
+    "the driver's steering torque from angle, speed and a single track (2019 eq. 92)", single_track_column,
 )  # fmt: skip
 _register(
     "driver-torque-motor", WHEEL, "steering_motor_torque",
-    "the driver's steering torque where the steering motor is all that acts beside the driver (2019)", _logged("steering_motor_torque"),
+    "the driver's steering torque from angle and motor torque, where nothing else acts (2019)",
+    _logged("steering_motor_torque"),
 )  # fmt: skip
 _register(
     "driver-torque-command", (*WHEEL, "torque_scale"), "steering_motor_command",
-    "the driver's steering torque from the wheel's angle and the motor's command, in the device's own unit (2019)", _logged("steering_motor_command"),
+    "the driver's steering torque from angle and motor command, where nothing else acts (2019)",
+    _logged("steering_motor_command"),
 )  # fmt: skip
 register(Estimator(
     "driver-torque-pi", WHEEL, ("steering_wheel_angle", "alignment_torque"),

@@ -75,7 +75,7 @@ def _write(drive: RigDrive, folder: Path, seed: int) -> None:
     """All files."""
     s, files = drive.setting, RigFiles(*(folder / name for name in FILES))
     files.weights.write_text(_weighings(s, np.random.default_rng([seed, 89])), encoding="utf-8")
-    torque = chirp(np.arange(round(_CHIRP[3] / s.dt) + 1) * s.dt, *_CHIRP[:3])
+    torque = chirp(np.arange(round(_CHIRP[3] / s.dt) + 1, dtype=np.float64) * s.dt, *_CHIRP[:3])
     noise = WheelNoise("derivative", 1e-4, (0.2 * s.resolution) ** 2, s.resolution)
     turned = simulate_wheel(torque, WheelSetting(s.wheel, noise, "exact", (0.0, 0.0), dt=s.dt), seed=seed).log()
     columns = (turned["steering_wheel_angle"].values, _command(torque, s))
