@@ -58,7 +58,7 @@ def exported(program: Program, folder: Path, flags: Sequence[str] = FLAGS) -> Ca
     lines += [f"        i.{c} = c{k}[k]; i.{c}_ok = f{k}[k];" for k, c in enumerate(channels)]
     lines += [f"        {name}_step(&s, &i, &o);"]
     lines += [f"        o{k}[k] = o.{c};" for k, c in enumerate(outputs)]
-    return _caller(shared("\n".join([*lines, "    }", "}", ""]), folder, "loop" + "_native" * (flags is NATIVE), flags))
+    return loop("\n".join([*lines, "    }", "}", ""]), folder, "loop", flags)
 
 
 _BY_HAND = """
@@ -92,12 +92,16 @@ void run(long n, double **in, unsigned char **ok, double **out)
 
 def by_hand(F: np.ndarray, K: np.ndarray, folder: Path, flags: Sequence[str] = FLAGS) -> Callable[..., None]:
     """The constant-gain observer in matrix form, as one writes it by hand: no start, no standstill, no bands."""
-    folder.mkdir(exist_ok=True)
     F_text, K_text = (
         "{ " + ", ".join("{ " + ", ".join(float(x).hex() for x in row) + " }" for row in M) + " }" for M in (F, K)
     )
-    name = "by_hand" + "_native" * (flags is NATIVE)
-    return _caller(shared(_BY_HAND % (F_text, K_text), folder, name, flags))
+    return loop(_BY_HAND % (F_text, K_text), folder, "by_hand", flags)
+
+
+def loop(source: str, folder: Path, name: str, flags: Sequence[str] = FLAGS) -> Callable[..., None]:
+    """The function `run` of C text as run(n, columns, flags, outputs), lists of arrays."""
+    folder.mkdir(exist_ok=True)
+    return _caller(shared(source, folder, name + "_native" * (flags is NATIVE), flags))
 
 
 def _caller(library: ctypes.CDLL) -> Callable[..., None]:

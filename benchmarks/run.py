@@ -20,7 +20,19 @@ from pathlib import Path
 
 from measure import Row, duration, say
 
-NAMES = ("start", "kernel", "live", "batch", "smoother", "limits", "decode", "end_to_end", "memory", "identification")
+NAMES = (
+    "start",
+    "kernel",
+    "live",
+    "batch",
+    "smoother",
+    "steering",
+    "limits",
+    "decode",
+    "end_to_end",
+    "memory",
+    "identification",
+)
 LIBRARIES = (
     "codriver", "numpy", "scipy", "casadi", "llvmlite", "pyarrow", "cantools", "python-can", "asammdf", "pandas", "filterpy",
     "statsmodels", "numba",

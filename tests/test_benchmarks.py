@@ -3,14 +3,19 @@
 import subprocess
 import sys
 
+import pytest
+
 from conftest import ROOT
 
 
-def test_quick_run():
-    """One of them measures; nothing is written."""
+@pytest.mark.parametrize("name", ["kernel", "steering"])
+def test_quick_run(name):
+    """Some of them measure; nothing is written."""
+    if name == "steering":
+        pytest.importorskip("filterpy")
     results = ROOT / "benchmarks" / "RESULTS.md"
     before = results.read_bytes() if results.exists() else b""
-    command = [sys.executable, ROOT / "benchmarks" / "run.py", "--quick", "--only", "kernel"]
+    command = [sys.executable, ROOT / "benchmarks" / "run.py", "--quick", "--only", name]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("| what | ours | alternative |")

@@ -137,7 +137,7 @@ class TestHelp:
         )  # fmt: skip
         assert done.returncode == 0
         assert done.stderr == ""
-        assert json.loads(done.stdout)["best"] == "kinematic"
+        assert json.loads(done.stdout)["best"]["intent"] == "kinematic"
 
 
 class TestInfo:
@@ -145,7 +145,7 @@ class TestInfo:
         ran = run("info", demo_files.log, *can, "--vehicle", "bisoffi2017")
         assert ran.code == 0
         assert "BLF, CAN trace, 180.0 s" in ran.out
-        assert "best available: intent-pedals" in ran.out
+        assert "best available for intent: intent-pedals" in ran.out
         assert "Brakes.BRK_MasterCylinder" in ran.out
         assert "1 gap, the longest 1.22 s" in ran.out
 
@@ -153,8 +153,8 @@ class TestInfo:
         ran = run("info", demo_files.log, *can, "--json")
         told = ran.summary
         assert ran.err == ""
-        assert told["best"] == "kinematic"
-        assert told["best_with_a_vehicle"] == "intent-pedals"
+        assert told["best"] == {"intent": "kinematic", "driver-torque": None}
+        assert told["best_with_a_vehicle"]["intent"] == "intent-pedals"
         assert {s["name"] for s in told["signals"]} >= {*KEYS, "gear", "brake_pressure"}
         pedals = next(e for e in told["estimators"] if e["name"] == "intent-pedals")
         assert pedals["signals_there"]
@@ -234,7 +234,7 @@ class TestInfo:
     def test_a_vehicle_that_lacks_parameters(self, run, demo_files, can):
         ran = run("info", demo_files.log, *can, "--vehicle", "renault-zoe")
         assert "lacks vehicle parameters: pedal_coefficient, brake_coefficient" in ran.out
-        assert "best available: intent-torque" in ran.out
+        assert "best available for intent: intent-torque" in ran.out
 
 
 class TestEstimate:

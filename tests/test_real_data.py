@@ -146,7 +146,7 @@ class TestZoe:
     def test_info(self, info, folder):
         code, out, _ = info(folder, "--vehicle", "renault-zoe")
         assert code == 0
-        assert "best available: intent-torque" in out
+        assert "best available for intent: intent-torque" in out
         assert "intent-pedals  lacks signals: brake_pressure, gear" in out
 
 
@@ -311,7 +311,7 @@ class TestUdacity:
         code, out, _ = info(log, "--names", NAMES / "udacity.toml", "--json")
         assert code == 0
         told = json.loads(out)
-        assert told["best"] is None
+        assert told["best"]["intent"] is None
         lacks = {e["name"]: e["missing_signals"] for e in told["estimators"]}
         assert lacks["kinematic"] == ["longitudinal_acceleration"]
         assert "accelerator_pedal" in lacks["intent-pedals"]

@@ -434,6 +434,22 @@ class TestLikelihood:
             rows = rows_of(simulate_wheel(CHIRP, replace(REAL, wheel=wheel, noise=quiet)))
             theta = np.array([np.log(J), np.log(B), wheel.friction, 0.0, -20.0, -20.0, -20.0])
             assert simulate(rows, theta, 0, (0.0, 0.0)) == pytest.approx(rows.angle, abs=off)
+            part = simulate(rows, theta, 20, (0.1, -2.0), 50)
+            assert np.array_equal(part, simulate(rows, theta, 20, (0.1, -2.0))[:50])
+
+    def test_looking_ahead_simulates_each_tick_once(self):
+        from unittest.mock import patch
+
+        ticks = []
+
+        def counted(*given):
+            ticks.append(simulate(*given).size)
+            return np.zeros(ticks[-1])
+
+        log = simulate_wheel(CHIRP, REAL).log()
+        with patch("codriver.identify.steering_wheel.simulate", counted):
+            identify_steering_wheel(log, filters=False)
+        assert 0.5 * CHIRP.size < sum(ticks) <= CHIRP.size
 
 
 class TestFit:

@@ -249,6 +249,65 @@ def test_what_cannot_be_read(tmp_path: Path, text: str | bytes, kind: type[error
         load(tmp_path, text)
 
 
+ROWS = "speed,roll_rate\n1.5,0.1\n1.6,0.2\n1.7,0.3\n"
+RATED = '[time]\nrate = 50\n[longitudinal_speed]\nsource = "speed"\nunit = "m/s"\n'
+
+
+class TestWithoutATimeColumn:
+    """The names file says how many rows a second there are."""
+
+    @pytest.mark.parametrize("name", ["drive.csv", "drive.txt", "drive.log", "drive.csv.gz", "drive.log.gz"])
+    def test_rows_are_ticks(self, tmp_path: Path, name: str) -> None:
+        raw = gzip.compress(ROWS.encode()) if name.endswith(".gz") else ROWS.encode()
+        (tmp_path / name).write_bytes(raw)
+        log = read(tmp_path / name, names=parse_names(RATED, "n.toml"))
+        assert log["longitudinal_speed"].time == pytest.approx([0, 0.02, 0.04])
+        assert log["longitudinal_speed"].values == pytest.approx([1.5, 1.6, 1.7])
+        assert not log.faults
+
+    def test_parquet(self, tmp_path: Path) -> None:
+        path = parquet(tmp_path, pa.table({"speed": TIME}))
+        (tmp_path / "n.toml").write_text(RATED)
+        log = read(path, names=tmp_path / "n.toml")
+        assert log["longitudinal_speed"].time == pytest.approx(np.arange(5) / 50)
+
+    def test_empty_cells_and_short_rows(self, tmp_path: Path) -> None:
+        """An empty cell is no sample; a row that cannot be read shifts those behind it, which is told."""
+        (tmp_path / "a.csv").write_text(ROWS.replace("1.6,", ","))
+        log = read(tmp_path / "a.csv", names=parse_names(RATED, "n"))
+        assert log["longitudinal_speed"].time == pytest.approx([0, 0.04])
+        (tmp_path / "b.csv").write_text(ROWS.replace("1.6,0.2", "1.6,0.2,7,8"))
+        log = read(tmp_path / "b.csv", names=parse_names(RATED, "n"))
+        assert log["longitudinal_speed"].time == pytest.approx([0, 0.02])
+        assert "all rows behind come 0.02 s early" in log.faults[0]
+
+    def test_a_time_column_counts_more(self, tmp_path: Path) -> None:
+        (tmp_path / "a.csv").write_text("time,speed\n5,1\n6,2\n")
+        log = read(tmp_path / "a.csv", names=parse_names(RATED, "n"))
+        assert log["longitudinal_speed"].time == pytest.approx([5, 6])
+        assert "50 rows a second, which is not used: time is the column 'time'" in log.faults[0]
+
+    @pytest.mark.parametrize(
+        "rate", ["rate = 0", "rate = true", 'rate = "100"', "rate = inf", "rate = 100\nunit = 'Hz'", ""]
+    )
+    def test_what_is_no_rate(self, rate: str) -> None:
+        with pytest.raises(errors.NamesError, match=r"\[time\] holds rate alone"):
+            parse_names(RATED.replace("rate = 50", rate), "n")
+
+    def test_without_a_rate_it_is_asked_for(self, tmp_path: Path) -> None:
+        (tmp_path / "a.log").write_text(ROWS)
+        with pytest.raises(errors.LogError, match=r"\[time\] rate = 100"):
+            read(tmp_path / "a.log")
+
+    def test_a_trace_stays_a_trace(self, tmp_path: Path) -> None:
+        (tmp_path / "a.log").write_text("(1.500000) can0 123#01020304\n(1.600000) can0 123#01020304\n")
+        with pytest.raises(errors.LogError, match="raw CAN trace of 2 frames"):
+            open_recording(tmp_path / "a.log")
+        (tmp_path / "b.log").write_text("started\nstopped, at last\n")
+        with pytest.raises(errors.FormatError, match="no CAN data frames"):
+            open_recording(tmp_path / "b.log")
+
+
 def parquet(folder: Path, table: pa.Table) -> Path:
     path = folder / "drive.parquet"
     pq.write_table(table, path)

@@ -74,15 +74,7 @@ class Program:
             MissingSignal: the log lacks a required signal.
             LogError: required signals lie more than an hour apart: their clocks are not the same.
         """
-        lacking = [name for name in self.observer.required if name not in log or not len(log[name])]
-        if lacking:
-            told = [fault for fault in log.faults if any(fault.startswith(name) for name in lacking)]
-            raise MissingSignal(
-                f"{self.observer.name} cannot run on {log.source or 'this log'}: it lacks {', '.join(lacking)}"
-                + (f" ({'; '.join(told)})" if told else ""),
-                f"the signals {', '.join(self.observer.required)}",
-                "map them in a names file, or use an estimator that does without; `codriver info LOG` says which",
-            )
+        refuse_missing(self.observer, log)
         if start is None:
             main = self.observer.measured or self.observer.required
             start = min((float(log[name].time[0]) for name in main if name in log), default=log.start)
@@ -220,6 +212,23 @@ class Stepper:
                 "restore it into a stepper of the same design, outputs and version",
             )  # fmt: skip
         self._carry[: len(carry)] = list(carry.values())
+
+
+def refuse_missing(observer: Observer, log: Log) -> None:
+    """Refuse a log that lacks what an observer requires.
+
+    Raises:
+        MissingSignal: the message names what is missing.
+    """
+    lacking = [name for name in observer.required if name not in log or not len(log[name])]
+    if lacking:
+        told = [fault for fault in log.faults if any(fault.startswith(name) for name in lacking)]
+        raise MissingSignal(
+            f"{observer.name} cannot run on {log.source or 'this log'}: it lacks {', '.join(lacking)}"
+            + (f" ({'; '.join(told)})" if told else ""),
+            f"the signals {', '.join(observer.required)}",
+            "map them in a names file, or use an estimator that does without; `codriver info LOG` says which",
+        )
 
 
 def _refuse_mixed_clocks(log: Log, names: Sequence[str]) -> None:

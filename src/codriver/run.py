@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import Any
 
 from codriver.errors import UsageError
 from codriver.estimate import Estimate
 from codriver.observers.feed import best, feeds, suggest_rate
+from codriver.observers.observer import Observer
 from codriver.observers.registry import build, families, get_estimator
-from codriver.observers.scaled_gain import Preset
-from codriver.program import compile
+from codriver.program import compile, refuse_missing
 from codriver.signals import Log
+from codriver.torque_fit import fit_torque_noise
 from codriver.vehicles import Vehicle
 
 RATES = (1.0, 10000.0)  # Hz
@@ -60,7 +61,7 @@ def estimate_log(
     *,
     ell: float | None = None,
     rate: float | None = None,
-    preset: str | Path | Preset | None = None,
+    preset: Any = None,
     form: str = "kalman",
 ) -> Estimate:
     """Estimate from a log.
@@ -69,7 +70,7 @@ def estimate_log(
         name: of an estimator, or of a family: then the best of it that log and vehicle feed.
         log: the signals.
         vehicle: its parameters, where the estimator needs some.
-        ell, preset, form: as for `build`.
+        ell, preset, form: as for `build`; without a preset, estimators of the driver's torque fit their noise to the log.
         rate: ticks per second; None takes that of the quickest measurement (`suggest_rate`).
 
     Raises:
@@ -80,7 +81,24 @@ def estimate_log(
     """
     check_rate(rate)
     name, _ = choose(name, log, vehicle)
+    return compile(observer_for(name, log, vehicle, ell=ell, rate=rate, preset=preset, form=form)).run(log)
+
+
+def observer_for(
+    name: str, log: Log, vehicle: Vehicle | None = None, *, ell: float | None = None, rate: float | None = None, preset: Any = None,
+    form: str = "kalman",
+) -> Observer:  # fmt: skip
+    """The observer that a log is run through: its tick from the log, and its noise, where it is one that learns.
+
+    Args:
+        name: of an estimator.
+        log, vehicle, ell, rate, preset, form: as for `estimate_log`.
+    """
+    probe = build(name, vehicle, ell=ell, preset=preset, form=form)
     if rate is None:
-        probe = build(name, vehicle, ell=ell, preset=preset, form=form)
         rate = suggest_rate(log, probe.measured or probe.required)
-    return compile(build(name, vehicle, dt=1.0 / rate, ell=ell, preset=preset, form=form)).run(log)
+    if preset is None and get_estimator(name).learns:
+        assert vehicle is not None  # else there would be no probe
+        refuse_missing(probe, log)
+        preset = fit_torque_noise(name, log, vehicle, rate).noise
+    return build(name, vehicle, dt=1.0 / rate, ell=ell, preset=preset, form=form)

@@ -27,13 +27,14 @@ def export_c_files(
     from codriver.cli.terminal import console
     from codriver.errors import UsageError
     from codriver.export import export_c
-    from codriver.observers import build, families
+    from codriver.observers import ESTIMATORS, build, families
     from codriver.program import compile
     from codriver.vehicles import load_vehicle
 
     if estimator in families():
         raise UsageError(
-            f"'{estimator}' stands for whatever a log can feed", "one estimator", "name it, such as intent-pedals"
+            f"'{estimator}' stands for whatever a log can feed", "one estimator",
+            f"name one: {', '.join(e.name for e in ESTIMATORS.values() if e.family == estimator)}",
         )
     car = load_vehicle(vehicle) if vehicle is not None else None
     observer = build(estimator, car, dt=dt, ell=ell, preset=preset, form=form)

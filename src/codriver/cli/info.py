@@ -16,29 +16,34 @@ def info(
     """Say what a log holds, which estimators it can feed, what is missing, and which is the best available."""
     from codriver.cli.options import check_inputs
     from codriver.logs import open_recording
+    from codriver.logs.names_file import load_names
     from codriver.logs.propose import propose_names
     from codriver.logs.read import own_names, read_recording
     from codriver.observers.feed import best, feeds, least_demanding
     from codriver.observers.gears import unknown_gears
+    from codriver.observers.registry import families
     from codriver.signals import Log
     from codriver.vehicles import load_vehicle
 
     check_inputs(log, dbc, names)
     car = load_vehicle(vehicle) if vehicle is not None else None
-    recording = open_recording(log, dbc=dbc, bus=bus)
+    mapping = load_names(names) if names is not None else None
+    recording = open_recording(log, dbc=dbc, bus=bus, rate=mapping.rate if mapping is not None else None)
     channels = recording.channels()
     begins = None
-    if names is None and recording.default_names is None and not own_names(recording).entries:
+    if mapping is None and recording.default_names is None and not own_names(recording).entries:
         signals = Log({}, str(log), tuple(recording.faults), tuple(sorted(channels)))  # nothing is mapped yet
         begins = propose_names(recording)
     else:
-        signals = read_recording(recording, names)
+        signals = read_recording(recording, mapping)
     # Without a vehicle, say what the log alone allows: parameters are told apart from signals.
     found = feeds(signals, car)
-    family = found[0].family  # the first is what `codriver estimate` is mostly asked for
-    members = [f for f in found if f.family == family]
-    fed = [f for f in members if not f.missing]
-    choice = best(signals, car, family=family).estimator if any(f.possible for f in members) else None
+    by_family = {family: [f for f in found if f.family == family] for family in families()}
+    choice, with_vehicle = {}, {}
+    for family, members in by_family.items():
+        fed = [f for f in members if not f.missing]
+        choice[family] = best(signals, car, family=family).estimator if any(f.possible for f in members) else None
+        with_vehicle[family] = fed[0].estimator if fed else None
     summary: dict[str, Any] = {
         "log": str(log),
         "format": recording.format,
@@ -63,8 +68,8 @@ def info(
             for f in found
         ],
         "best": choice,
-        "best_with_a_vehicle": fed[0].estimator if fed else None,
-        "least_demanding": least_demanding(family),
+        "best_with_a_vehicle": with_vehicle,
+        "least_demanding": {family: least_demanding(family) for family in by_family},
         "vehicle": car.name if car is not None else None,
     }
     if json:
@@ -119,9 +124,28 @@ def _show(summary: dict[str, Any]) -> None:
         out.print(f"\n[bold]vehicle {escape(summary['vehicle'])}[/]")
         say_findings(out, summary["findings"])
     out.print("\n[bold]estimators[/]")
-    for e in summary["estimators"]:
+    families = dict.fromkeys(e["family"] for e in summary["estimators"])
+    for family in families:
+        _show_family(family, [e for e in summary["estimators"] if e["family"] == family], summary)
+    _show_best(summary)
+
+
+def _show_family(family: str, members: list[dict[str, Any]], summary: dict[str, Any]) -> None:
+    """The estimators of a family, a line each; one line for all where the log has the signals of none, and of another's."""
+    from codriver.cli.terminal import console
+
+    out = console()
+    others = any(e["signals_there"] for e in summary["estimators"])
+    if others and not any(e["signals_there"] for e in members):
+        least = next(e for e in members if e["name"] == summary["least_demanding"][family])
+        out.print(
+            f"  [red]no[/]   {family}: {len(members)} estimators; {least['name']}, which needs the least, lacks signals: "
+            + ", ".join(least["missing_signals"])
+        )
+        return
+    for e in members:
         if e["possible"]:
-            out.print(f"  [green]yes[/]  {e['name']:<14} {e['meaning']}")
+            out.print(f"  [green]yes[/]  {e['name']:<21} {e['meaning']}")
             continue
         lacks = [f"signals: {', '.join(e['missing_signals'])}"] if e["missing_signals"] else []
         if e["missing_parameters"]:
@@ -130,17 +154,28 @@ def _show(summary: dict[str, Any]) -> None:
                 f"vehicle parameters: {', '.join(e['missing_parameters'])}" if given else "a vehicle (--vehicle)"
             )
         mark = "[yellow]part[/]" if e["signals_there"] else "[red]no[/]  "
-        out.print(f"  {mark} {e['name']:<14} lacks {'; '.join(lacks)}")
-    if summary["best"]:
-        out.print(f"\nbest available: [bold]{summary['best']}[/]", end="")
-        if summary["best_with_a_vehicle"] != summary["best"]:
-            out.print(f"; with a vehicle file, {summary['best_with_a_vehicle']}", end="")
-        out.print()
-    elif summary["best_with_a_vehicle"]:
-        out.print(f"\nbest available with a vehicle file: [bold]{summary['best_with_a_vehicle']}[/]")
-    else:
-        least = next(e for e in summary["estimators"] if e["name"] == summary["least_demanding"])
-        out.print(
-            f"\nno estimator can be fed: {least['name']}, which needs the least, lacks "
-            + " and ".join(least["missing_signals"])
-        )
+        out.print(f"  {mark} {e['name']:<21} lacks {'; '.join(lacks)}")
+
+
+def _show_best(summary: dict[str, Any]) -> None:
+    """The best estimator of each family that the log can feed; if there is none at all, what the least demanding lacks."""
+    from codriver.cli.terminal import console
+
+    out = console()
+    told = False
+    for family, choice in summary["best"].items():
+        with_vehicle = summary["best_with_a_vehicle"][family]
+        if choice is None and with_vehicle is None:
+            continue
+        more = f"with a vehicle file, {with_vehicle}" if with_vehicle != choice else ""
+        text = "; ".join(part for part in (f"[bold]{choice}[/]" if choice else "", more) if part)
+        out.print(("" if told else "\n") + f"best available for {family}: {text}")
+        told = True
+    if told:
+        return
+    # The first family is what a log is mostly wanted for.
+    least = next(iter(summary["least_demanding"].values()))
+    entry = next(e for e in summary["estimators"] if e["name"] == least)
+    out.print(
+        f"\nno estimator can be fed: {least}, which needs the least, lacks " + " and ".join(entry["missing_signals"])
+    )

@@ -34,7 +34,8 @@ PresetName = Annotated[
     str | None,
     typer.Option(
         "--preset",
-        help="Noise of a paper, or a preset file (TOML). Default: bisoffi2017 (intent-torque's paper has bisoffi2015).",
+        help="Noise of a paper, or a preset file (TOML). Default: bisoffi2017 (intent-torque's paper has bisoffi2015); "
+        "driver-torque fits its noise to the log.",
         show_default=False,
     ),
 ]
@@ -43,7 +44,8 @@ EstimatorName = Annotated[
     str,
     typer.Argument(
         metavar="ESTIMATOR",
-        help="intent-pedals, intent-torque, kinematic, pedals-only, or intent: the best the log can feed.",
+        help="intent (intended acceleration and jerk) or driver-torque (at the steering wheel): the best the log can feed. Or one "
+        "of them: intent-pedals, ..., driver-torque-pi; codriver info LOG lists all.",
         show_default=False,
     ),
 ]

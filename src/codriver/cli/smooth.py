@@ -21,7 +21,8 @@ Smoothed = Annotated[
     str,
     typer.Argument(
         metavar="ESTIMATOR",
-        help="intent-pedals, intent-torque, kinematic, or intent: the best the log can feed. Others have no such filter.",
+        help="intent-pedals, intent-torque, kinematic or intent; driver-torque or one of its Kalman filters. Others have no such "
+        "filter.",
         show_default=False,
     ),
 ]
@@ -49,7 +50,7 @@ def smooth(
     report: Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)] = None,
     json: Json = False,
 ) -> None:
-    """Estimate what the driver intended from a recorded drive, looking ahead: no lag, and not for live use.
+    """Estimate what the driver intended or did from a recorded drive, looking ahead: no lag, and not for live use.
 
     Example: codriver smooth intent drive.blf --dbc car.dbc --names names.toml --vehicle bisoffi2017 -o drive.parquet
     """

@@ -58,7 +58,7 @@ def say(summary: dict[str, Any]) -> None:
     out = console()
     settings = summary["settings"]
     parts = [
-        f"{key} {_short(settings[key])}" for key in ("vehicle", "ell", "preset", "form", "smoother") if key in settings
+        f"{key} {_short(settings[key])}" for key in ("vehicle", "known_torque", "ell", "preset", "order", "form", "smoother") if key in settings
     ]
     out.print(
         f"[bold]{summary['estimator']}[/] on {escape(summary['log'])}" + (f": {', '.join(parts)}" if parts else "")

@@ -6,6 +6,7 @@ from codriver.identify.check_log import check_vehicle_against_log
 from codriver.identify.learning import LearningPoint
 from codriver.identify.pedal import PedalFit, identify_pedal
 from codriver.identify.ratio import GearRatio, RatioFit, identify_ratio
+from codriver.identify.steer_row_fit import SteerRecord, SteerRowFit, fit_steer_row, steer_record
 from codriver.identify.steering_result import SteeringFit
 from codriver.identify.steering_wheel import identify_steering_wheel
 from codriver.identify.torque_scale import TorqueScale, identify_torque_scale
@@ -18,12 +19,16 @@ __all__ = [
     "PedalFit",
     "RatioFit",
     "Refusal",
+    "SteerRecord",
+    "SteerRowFit",
     "SteeringFit",
     "TorqueScale",
     "check_vehicle_against_log",
+    "fit_steer_row",
     "identify_brake",
     "identify_pedal",
     "identify_ratio",
     "identify_steering_wheel",
     "identify_torque_scale",
+    "steer_record",
 ]

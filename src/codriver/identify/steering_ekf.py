@@ -42,8 +42,9 @@ def joint_ekf(
         s = column[0] + settings.angle
         fresh = ok[angle]
         e = select(fresh, y[angle] - z_minus[0], 0.0)
-        z_new = held_up([z_minus[i] + column[i] / s * e for i in range(4)], settings)
-        P_new = {(i, k): P_minus[i, k] - select(fresh, column[i] * column[k] / s, 0.0) for i, k in PAIRS}
+        gain = [c / s for c in column]
+        z_new = held_up([z_minus[i] + gain[i] * e for i in range(4)], settings)
+        P_new = {(i, k): P_minus[i, k] - select(fresh, gain[i] * column[k], 0.0) for i, k in PAIRS}
         return finish(settings, carry, z_new, P_new, e, s, select(ok[torque], u[torque], before))
 
     return Observer(

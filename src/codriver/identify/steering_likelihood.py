@@ -125,22 +125,25 @@ def derivatives(rows: Rows, theta: Array, free: list[int]) -> tuple[Array, Array
     return np.column_stack(by_e), np.column_stack(by_s)
 
 
-def simulate(rows: Rows, theta: Array, start: int, state: tuple[float, float]) -> Array:
-    """The angle of a wheel that only its torque turns, rad, shape (n - start,): no measurement corrects it.
+def simulate(rows: Rows, theta: Array, start: int, state: tuple[float, float], count: int | None = None) -> Array:
+    """The angle of a wheel that only its torque turns, rad, shape (count,): no measurement corrects it.
 
     Args:
         rows: the recording, for its torque.
         theta: the wheel.
         start: first tick.
         state: angle and rate there.
+        count: of ticks; all that follow by default.
     """
-    tick = _tick(rows, theta)
-    angle = np.empty(rows.time.size - start)
+    tick, steps = _tick(rows, theta), _steps(rows, theta)
+    constant, friction = float(theta[3]), float(theta[2])
+    angle = np.empty(rows.time.size - start if count is None else count)
     x = state
     for k in range(angle.size):
         angle[k] = x[0]
-        for _ in range(_steps(rows, theta)):
-            x = tick.advance(*x, float(rows.torque[start + k]) + theta[3], theta[2])
+        torque = float(rows.torque[start + k]) + constant
+        for _ in range(steps):
+            x = tick.advance(*x, torque, friction)
     return angle
 
 

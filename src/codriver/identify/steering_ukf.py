@@ -9,7 +9,8 @@ drawn anew about z- (69), need not be drawn: the angle is a state, so with m = s
 
     y^ = m delta-,   s = R + sum W_c d^2 + 2 W c^2 Phi-_11,   Phi_zy = 2 W c^2 Phi-_1                                      (71)-(73)
 
-where m = 1, d = 0 and 2 W c^2 = 1 with the right weights. S is Cholesky's.
+where m = 1, d = 0 and 2 W c^2 = 1 with the right weights. S is Cholesky's, found as L D^(1/2) from Phi = L D L': there no root
+waits for another.
 Okamoto, Tsiotras 2019 (Robotics and Autonomous Systems); Wan, van der Merwe 2000, doi:10.1109/ASSPCC.2000.882463.
 """
 
@@ -80,8 +81,9 @@ def joint_ukf(
         s = column[0] + settings.angle + (w.covariance + 2 * N * w.other) * ((1 - total) * z_minus[0]) ** 2
         fresh = ok[angle]
         e = select(fresh, y[angle] - total * z_minus[0], 0.0)
-        z_new = held_up([z_minus[i] + column[i] / s * e for i in range(4)], settings)
-        P_new = {(i, k): P_minus[i, k] - select(fresh, column[i] * column[k] / s, 0.0) for i, k in PAIRS}
+        gain = [c / s for c in column]
+        z_new = held_up([z_minus[i] + gain[i] * e for i in range(4)], settings)
+        P_new = {(i, k): P_minus[i, k] - select(fresh, gain[i] * column[k], 0.0) for i, k in PAIRS}
         return finish(settings, carry, z_new, P_new, e, s, select(ok[torque], u[torque], before))
 
     return Observer(
@@ -113,9 +115,10 @@ def _moved(
 
 def cholesky(P: dict[tuple[int, int], Scalar]) -> dict[tuple[int, int], Scalar]:
     """The lower root of a symmetric matrix given by its upper entries; NaN where it is not positive."""
-    root: dict[tuple[int, int], Scalar] = {}
+    over, unit = dict[tuple[int, int], Scalar](), dict[tuple[int, int], Scalar]()
     for k in range(N):
-        root[k, k] = sqrt(P[k, k] - sum(root[k, m] ** 2 for m in range(k)))
-        for i in range(k + 1, N):
-            root[i, k] = (P[k, i] - sum(root[i, m] * root[k, m] for m in range(k))) / root[k, k]
-    return root
+        for i in range(k, N):
+            over[i, k] = P[k, i] - sum(over[i, m] * unit[k, m] for m in range(k))
+            unit[i, k] = over[i, k] / over[k, k] if i > k else 1.0
+    scale = [sqrt(over[k, k]) for k in range(N)]
+    return {(i, k): unit[i, k] * scale[k] for i, k in unit}

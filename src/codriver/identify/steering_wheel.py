@@ -166,7 +166,7 @@ def _ahead(rows: Rows, best: Best) -> tuple[Array, float]:
         if rows.reset[start : start + every].any():
             continue
         state = float(best.run.angle[start]), float(best.run.rate[start])
-        part = simulate(rows, best.theta, start, state)[:every]
+        part = simulate(rows, best.theta, start, state, every)
         simulated[start : start + every] = part
         there = rows.fresh[start : start + every]
         truth = rows.angle[start : start + every][there]

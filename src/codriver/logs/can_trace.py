@@ -7,6 +7,7 @@ measurement, as the trace has them, in BLF, ASC and TRC; a candump log knows no 
 from __future__ import annotations
 
 import gzip
+import re
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +16,9 @@ from codriver.errors import FormatError, LogError
 from codriver.logs.blf import parse_blf
 from codriver.logs.can_recording import CanRecording
 from codriver.logs.candump import parse_candump
+from codriver.logs.csv_layout import look
 from codriver.logs.frames import Frames
+from codriver.logs.recording import Recording
 from codriver.logs.registry import ReadOptions, reader
 from codriver.logs.text_traces import parse_asc, parse_trc
 
@@ -38,9 +41,13 @@ def read_trc(path: Path, options: ReadOptions) -> CanRecording:
     return _recording(path, options, "TRC, CAN trace", parse_trc, "1) 1059.9 Rx 0300 7 00 00 00 00 04 00 00")
 
 
-@reader(".log", ".log.gz", title="candump log, CAN trace")
-def read_candump(path: Path, options: ReadOptions) -> CanRecording:
-    """The log files of candump; see `codriver.logs.candump`."""
+@reader(".log", ".log.gz", title="candump log, CAN trace; or a table")
+def read_candump(path: Path, options: ReadOptions) -> Recording:
+    """The log files of candump, see `codriver.logs.candump`; a file of rows of numbers below a header is a table."""
+    if _is_table(path):
+        from codriver.logs.table import CsvRecording
+
+        return CsvRecording(path, options.rate)
     return _recording(path, options, "candump log, CAN trace", parse_candump, "(1436509052.249713) can0 123#01020304")
 
 
@@ -76,6 +83,17 @@ def _recording(
             "check that the suffix fits the format (a table must end in .csv), and that the recording was made on a running bus",
         )
     return CanRecording(str(path), title, frames, options.dbc, options.bus, faults)
+
+
+def _is_table(path: Path) -> bool:
+    """Whether a text is a table: several columns with names of their own, most of them numbers."""
+    try:
+        layout = look(path)
+    except (LogError, OSError):
+        return False
+    numbers = sum(kind in ("number", "integer", "bool") for kind in layout.kinds)
+    named = all(re.match(r"[A-Za-z_]", header) for header in layout.headers)
+    return layout.delimiter != " " and len(layout.headers) > 1 and named and 2 * numbers > len(layout.headers)
 
 
 def _content(path: Path) -> tuple[bytes, list[str]]:

@@ -7,6 +7,9 @@ scale = 1.01                      # optional: value * scale + offset, in the sou
 offset = 0.0
 sign = -1                         # optional: -1 turns the direction
 valid = "Wheels.Ready"            # optional: values count only where this channel, held, is not 0
+
+[time]                            # only for tables that have no time column
+rate = 100                        # rows a second
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from codriver.names import VOCABULARY, nearest
 from codriver.toml_file import parse_tables, read_text
 from codriver.units import to_si
 
+TIME = "time"
 _FIELDS = ("source", "unit", "scale", "offset", "sign", "valid")
 
 
@@ -98,15 +102,22 @@ class Entry:
 
 @dataclass(frozen=True)
 class NamesFile:
-    """A mapping from a source's channels to standard names, by standard name."""
+    """A mapping from a source's channels to standard names, by standard name.
+
+    Attributes:
+        entries: by standard name.
+        where: the file.
+        rate: rows a second of a table without a time column; None where the file does not say.
+    """
 
     entries: Mapping[str, Entry]
     where: str = ""
+    rate: float | None = None
 
     @classmethod
-    def of(cls, *entries: Entry, where: str = "") -> NamesFile:
+    def of(cls, *entries: Entry, where: str = "", rate: float | None = None) -> NamesFile:
         """A mapping of the entries given."""
-        return cls({entry.name: entry for entry in entries}, where)
+        return cls({entry.name: entry for entry in entries}, where, rate)
 
 
 def load_names(path: str | Path) -> NamesFile:
@@ -126,6 +137,7 @@ def parse_names(text: str, where: str) -> NamesFile:
     """
     tables = parse_tables(text, where, NamesError)
     faults: list[str] = []
+    rate = _rate(tables.pop(TIME), faults) if TIME in tables else None
     entries = [entry for name, table in tables.items() if (entry := _entry(name, table, faults)) is not None]
     if not entries and not faults:
         faults.append("no signal is mapped")
@@ -135,7 +147,16 @@ def parse_names(text: str, where: str) -> NamesFile:
             "tables named by standard signal names, each with source, and unit, scale, offset, sign, valid where needed",
             "mend the file; docs/names.md lists the names, `codriver info LOG` the channels of a log",
         )
-    return NamesFile.of(*entries, where=where)
+    return NamesFile.of(*entries, where=where, rate=rate)
+
+
+def _rate(table: Any, faults: list[str]) -> float | None:
+    """Rows a second, from the table [time]; what is wrong with it is added to `faults`."""
+    rate = table.get("rate") if isinstance(table, dict) and set(table) == {"rate"} else None
+    if isinstance(rate, bool) or not isinstance(rate, (int, float)) or not 0 < rate < math.inf:
+        faults.append(f"[{TIME}] holds rate alone: rows a second, above 0, of a table without a time column")
+        return None
+    return float(rate)
 
 
 def _entry(name: str, table: Any, faults: list[str]) -> Entry | None:

@@ -21,20 +21,23 @@ from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
 
 
-def open_recording(path: str | Path, *, dbc: str | Path | None = None, bus: int | None = None) -> Recording:
+def open_recording(
+    path: str | Path, *, dbc: str | Path | None = None, bus: int | None = None, rate: float | None = None
+) -> Recording:
     """Open a recording without loading its samples.
 
     Args:
         path: a file or a folder of a known layout.
         dbc: CAN database, for raw CAN traces.
         bus: CAN channel to keep; None keeps all.
+        rate: rows a second of a table without a time column.
 
     Raises:
         LogError: it does not exist, or cannot be read.
         FormatError: no reader knows it, or it is not what its name promises.
     """
     path = Path(path)
-    return find_reader(path).function(path, ReadOptions(Path(dbc) if dbc is not None else None, bus))
+    return find_reader(path).function(path, ReadOptions(Path(dbc) if dbc is not None else None, bus, rate))
 
 
 def read(
@@ -61,7 +64,9 @@ def read(
         NamesError: the names file is wrong, or names channels that the recording lacks altogether.
         UnitError: a unit is unknown or of another kind.
     """
-    return read_recording(open_recording(path, dbc=dbc, bus=bus), names)
+    mapping = load_names(names) if isinstance(names, (str, Path)) else names
+    rate = mapping.rate if mapping is not None else None
+    return read_recording(open_recording(path, dbc=dbc, bus=bus, rate=rate), mapping)
 
 
 def read_recording(recording: Recording, names: str | Path | NamesFile | None = None) -> Log:

@@ -19,10 +19,12 @@ class ReadOptions:
     Attributes:
         dbc: path of the CAN database; None where the caller gave none.
         bus: CAN channel to keep; None keeps all.
+        rate: rows a second of a table without a time column; None where nobody said.
     """
 
     dbc: Path | None = None
     bus: int | None = None
+    rate: float | None = None
 
 
 class ReaderFunction(Protocol):

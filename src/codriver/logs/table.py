@@ -1,4 +1,4 @@
-"""Tables: CSV and Parquet with a time column, one channel a column.
+"""Tables: CSV and Parquet with a time column or a known rate, one channel a column.
 
 Columns may be of different rates: an empty cell is no sample of its column. NaN is a sample that says "no number",
 except in a column of which a third or more is NaN; that is how tables of several rates look when a tool fills them up.
@@ -19,7 +19,7 @@ from codriver.logs.clock import shared_run
 from codriver.logs.csv_layout import EMPTY_CELLS, inflate, look, unique
 from codriver.logs.recording import RawSignal, Recording, SourceChannel
 from codriver.logs.registry import ReadOptions, reader
-from codriver.logs.table_clock import find_clock, seconds, split_unit
+from codriver.logs.table_clock import clock_or_rate, seconds, split_unit
 from codriver.logs.wording import counted
 from codriver.signals.signal import Array
 
@@ -32,10 +32,14 @@ _MOSTLY_EMPTY = 1 / 3
 class TableRecording(Recording):
     """A table: a clock and columns beside it."""
 
-    def __init__(self, path: Path, form: str, clock: str, unit: str, channels: Sequence[SourceChannel]) -> None:
+    def __init__(
+        self, path: Path, form: str, clock: str, unit: str, channels: Sequence[SourceChannel], rate: float | None = None
+    ) -> None:
         self.path, self.format = str(path), form
         self.faults: list[str] = []
-        self._clock, self._clock_unit = clock, unit
+        self._clock, self._clock_unit, self._rate = clock, unit, rate
+        if rate is not None and clock:
+            self._tell(f"the names file gives {rate:g} rows a second, which is not used: time is the column '{clock}'")
         self._channels = {channel.name: channel for channel in channels}
 
     def channels(self) -> Mapping[str, SourceChannel]:
@@ -55,9 +59,12 @@ class TableRecording(Recording):
                 wanted[name] = bare[name][0]
         if not wanted:
             return {}
-        columns = self._read(sorted({self._clock, *wanted.values()}))
+        columns = self._read(sorted({*wanted.values(), *([self._clock] if self._clock else [])}))
         notes: list[str] = []
-        stamps = seconds(columns[self._clock], self._clock_unit, self._clock, notes)
+        if self._clock:
+            stamps = seconds(columns[self._clock], self._clock_unit, self._clock, notes)
+        else:
+            stamps = np.arange(len(next(iter(columns.values())))) / (self._rate or 1.0)
         for note in notes:
             self._tell(note)
         headers = set(wanted.values())
@@ -65,7 +72,7 @@ class TableRecording(Recording):
         if notes:
             stamps, columns = stamps[kept], {header: columns[header].filter(kept) for header in headers}
         for note in notes:
-            self._tell(f"time column '{self._clock}': {note}")
+            self._tell(f"time column '{self._clock}': {note}" if self._clock else note)
         made = {header: _samples(stamps, columns[header]) for header in headers}
         return {name: RawSignal(*made[header], self._channels[header].unit) for name, header in wanted.items()}
 
@@ -100,20 +107,22 @@ def _samples(stamps: Array, column: pa.ChunkedArray) -> tuple[Array, Array]:
 class CsvRecording(TableRecording):
     """A CSV file; only its head is read until columns are asked for."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, rate: float | None = None) -> None:
         layout = look(path)
         self._file, self._layout = path, layout
         dates = [kind == "text" for kind in layout.kinds]
-        index, unit = find_clock(layout.headers, dates, str(path))
+        index, unit = clock_or_rate(layout.headers, dates, str(path), rate)
         channels = [
-            SourceChannel(header, unit)
-            for i, (header, unit, kind) in enumerate(zip(layout.headers, layout.units, layout.kinds, strict=True))
+            SourceChannel(header, own)
+            for i, (header, own, kind) in enumerate(zip(layout.headers, layout.units, layout.kinds, strict=True))
             if kind != "text" and i != index
         ]
-        super().__init__(path, "CSV table", layout.headers[index], unit or layout.units[index], channels)
-        self._integer_clock = layout.kinds[index] == "integer"
-        self._text_clock = layout.kinds[index] == "text"
-        numbers = {channel.name for channel in channels} | {layout.headers[index]}
+        clock = layout.headers[index] if index is not None else ""
+        kind = layout.kinds[index] if index is not None else ""
+        unit = unit or (layout.units[index] if index is not None else "")
+        super().__init__(path, "CSV table", clock, unit, channels, rate)
+        self._integer_clock, self._text_clock = kind == "integer", kind == "text"
+        numbers = {channel.name for channel in channels} | {clock}
         skipped = [header for header in layout.headers if header not in numbers]
         if skipped:
             self._tell(
@@ -183,6 +192,11 @@ class CsvRecording(TableRecording):
         if bad:
             self._tell(
                 f"{counted(len(bad), 'row', 'has', 'have')} too few or too many cells; left out, the first: '{bad[0][:60]}'"
+                + (
+                    ""
+                    if self._clock
+                    else f"; without a time column all rows behind come {1 / (self._rate or 1):g} s early for each"
+                )
             )
         return table
 
@@ -217,7 +231,7 @@ class CsvRecording(TableRecording):
 class ParquetRecording(TableRecording):
     """A Parquet file; columns are read when asked for. Units and comments come from the fields' metadata."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, rate: float | None = None) -> None:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -233,7 +247,7 @@ class ParquetRecording(TableRecording):
         if not self._table.metadata.num_rows:
             raise LogError(f"{path} has {len(schema)} columns and no rows", "rows of data", "check how it was written")
         dates = [pa.types.is_temporal(field.type) for field in schema]
-        index, unit = find_clock(schema.names, dates, str(path))
+        index, unit = clock_or_rate(schema.names, dates, str(path), rate)
         headers = unique(schema.names)
         self._place = {
             header: (name, schema.names[:i].count(name))
@@ -249,7 +263,7 @@ class ParquetRecording(TableRecording):
                 channels.append(SourceChannel(headers[i], own, _note(field, "comment")))
             elif not field.name.startswith("__index_level"):
                 skipped.append(field.name)
-        super().__init__(path, "Parquet table", headers[index], unit, channels)
+        super().__init__(path, "Parquet table", headers[index] if index is not None else "", unit, channels, rate)
         if skipped:
             self._tell(
                 f"{counted(len(skipped), 'column', 'is', 'are')} not numeric and left out: {', '.join(skipped[:8])}"
@@ -279,10 +293,10 @@ def _note(field: pa.Field, key: str) -> str:
 @reader(".csv", ".csv.gz", ".tsv", ".txt", title="CSV table")
 def read_csv(path: Path, options: ReadOptions) -> Recording:
     """Open a CSV file."""
-    return CsvRecording(path)
+    return CsvRecording(path, options.rate)
 
 
 @reader(".parquet", ".pq", title="Parquet table")
 def read_parquet(path: Path, options: ReadOptions) -> Recording:
     """Open a Parquet file."""
-    return ParquetRecording(path)
+    return ParquetRecording(path, options.rate)

@@ -78,9 +78,30 @@ def find_clock(headers: Sequence[str], dates: Sequence[bool], where: str) -> tup
         raise LogError(
             f"{where} has no time column; its columns are: {listed}",
             "a column named time, timestamp or t, such as 'time [s]'",
-            "name the time column 'time', or add one: row number divided by the sampling rate",
+            "name the time column 'time', or add one: row number divided by the sampling rate; or say the rate in the names "
+            "file: [time] rate = 100",
         )
     return best[1], best[2]
+
+
+def clock_or_rate(
+    headers: Sequence[str], dates: Sequence[bool], where: str, rate: float | None
+) -> tuple[int | None, str]:
+    """As `find_clock`; a table without a time column that has a known rate gives None and "".
+
+    Args:
+        headers, dates, where: as for `find_clock`.
+        rate: rows a second, or None.
+
+    Raises:
+        LogError: there is neither.
+    """
+    try:
+        return find_clock(headers, dates, where)
+    except LogError:
+        if rate is None:
+            raise
+        return None, ""
 
 
 def seconds(column: Any, unit: str, name: str, faults: list[str]) -> Array:

@@ -1,7 +1,19 @@
 """Plants: one a file; what observers are designed on."""
 
+from codriver.models.bicycle import BicycleMatrices, BicycleParameters, bicycle_matrices, bicycle_model
 from codriver.models.longitudinal import intention_model
 from codriver.models.state_space import StateSpace
+from codriver.models.steer_row import SteerMotion, SteerRow
 from codriver.models.steering import steering_model
 
-__all__ = ["StateSpace", "intention_model", "steering_model"]
+__all__ = [
+    "BicycleMatrices",
+    "BicycleParameters",
+    "StateSpace",
+    "SteerMotion",
+    "SteerRow",
+    "bicycle_matrices",
+    "bicycle_model",
+    "intention_model",
+    "steering_model",
+]

@@ -101,7 +101,8 @@ def tick_of(inertia: Value, damping: Value, dt: float, form: str = "exact") -> T
         ValueError: there is no such form.
     """
     if form == "euler":
-        return Tick(dt, 1 - damping * dt / inertia, 0.0, dt / inertia)
+        push = dt / inertia
+        return Tick(dt, 1 - damping * push, 0.0, push)
     if form != "exact":
         raise ValueError(f"form '{form}'; there are {', '.join(FORMS)}")
     x = damping * dt / inertia

@@ -117,7 +117,7 @@ def design_disturbance_filter(
 def _certify(F: Array, left: Array, dt: float, unknown: tuple[str, ...]) -> Certificate:
     """What the gain shows: the poles of a tick."""
     poles = np.linalg.eigvals(left @ F).astype(complex)
-    continuous = np.log(np.where(poles == 0, 1e-300, poles)) / dt
+    continuous = np.asarray(np.log(np.where(poles == 0, 1e-300, poles)) / dt, dtype=complex)
     decay = float(-continuous.real.max())
     claims = (
         f"(A, C) with {', '.join(unknown)} among the states is detectable (PBH)",
@@ -125,5 +125,7 @@ def _certify(F: Array, left: Array, dt: float, unknown: tuple[str, ...]) -> Cert
         f"the error decays with {decay:.4g} 1/s or quicker where every tick has its measurements",
     )
     if not stable(poles):
-        raise DesignError(f"the filter fails its certificate: {'; '.join(claims)}", "a stable filter", "correct the noises")
+        raise DesignError(
+            f"the filter fails its certificate: {'; '.join(claims)}", "a stable filter", "correct the noises"
+        )
     return Certificate(True, claims, continuous, poles, decay)

@@ -54,7 +54,7 @@ def driver_torque_design(vehicle: Vehicle, noise: TorqueNoise, dt: float) -> Dis
     )
     return design_disturbance_filter(
         model, ("driver_torque",), dt, unknown_noise=[noise.torque**2], output_noise=[noise.angle**2],
-        state_noise=[0.0, noise.rate**2], order=noise.order,
+        state_noise=[noise.slip**2, noise.rate**2], order=noise.order,
     )  # fmt: skip
 
 
@@ -126,9 +126,7 @@ def driver_torque_observer(
 def filter_of(design: DisturbanceDesign, wide: list[float]) -> Filter:
     """A design as the tick takes it."""
     model = design.model
-    return Filter(
-        design.F, design.G_0, design.G_1, model.C, model.D, design.Q_d, [plain(r) for r in design.R], wide
-    )
+    return Filter(design.F, design.G_0, design.G_1, model.C, model.D, design.Q_d, [plain(r) for r in design.R], wide)
 
 
 def _by_parameters(now: Moments, torque: Scalar, J: float, b: float, sd_J: float, sd_b: float) -> Scalar:

@@ -3,9 +3,8 @@
     x_k = Phi x_{k-1} + G_0 w_{k-1} + G_1 w_k,     x = (z, v^),  w = (y, u)                     w straight between ticks
     x_k = Phi x_{k-1} + (G_0 + G_1) w_{k-1}                                                     w held over the tick
 
-Both are exact, by the matrix exponential of (33); the paper integrates by Runge and Kutta with w held. On a tick without a
-measurement y is what the observer itself expects, y = C x^ = (I - C T_2)^-1 C z, so that it runs on as a model does: with
-w straight that is one linear equation for z_k, solved when it is designed.
+Both are exact, by the matrix exponential of (33); the paper integrates by Runge and Kutta with w held. To a tick without a
+measurement x^ moves as the plant does under v^, exactly too, and z = T_1 x^.
 
 It starts when every output was measured once: x^ as that measurement has it, rates and unknown inputs 0, z = T_1 x^. Then its
 error is what it is, and dies as the certificate says; `valid` is 1 from five of the slowest time constants on, where the known
@@ -22,9 +21,10 @@ import numpy as np
 from codriver.errors import DesignError
 from codriver.kernel import Scalar, both, either, negate, select
 from codriver.names import VOCABULARY
-from codriver.observers.covariance import plain, predict_mean
+from codriver.observers.covariance import predict_mean
 from codriver.observers.observer import Observer, Output, Scalars
 from codriver.observers.pi_design import PIDesign
+from codriver.observers.unknown_input import with_unknown
 from codriver.signals.signal import Array
 
 INPUTS = ("straight", "held")
@@ -56,12 +56,12 @@ def pi_observer(
     scale = [1.0] * p if scales is None else [float(s) for s in scales]
     seen = _state_of_each_output(design.C)
     measured, known = design.model.outputs, design.known
-    Phi = system.transition(dt)
-    before, now = system.input_maps(dt)
+    Phi, (before, now) = system.transition(dt), system.input_maps(dt)
+    plant = with_unknown(design.model, design.unknown)
+    Phi_free, (before_free, now_free) = plant.transition(dt), plant.input_maps(dt)
     if inputs == "held":
         before, now = before + now, np.zeros_like(now)
-    expected = np.linalg.solve(np.eye(p) - design.C @ design.T_2, design.C)  # y = expected z
-    unmeasured = _unmeasured(now, expected, n, p)
+        before_free, now_free = before_free + now_free, np.zeros_like(now_free)
     settle = SETTLES / design.certificate.decay_rate
 
     def step(carry: Scalars, u: Scalars, y: Scalars, ok: Scalars, rho: Scalars) -> tuple[Scalars, Scalars]:
@@ -74,23 +74,25 @@ def pi_observer(
             fresh = both(fresh, ok[c])
         begun = carry["begun"]
         first = both(negate(begun), fresh)
-        # Without known inputs and outputs of this tick, then with them.
-        rest = [a + b for a, b in zip(predict_mean(x, Phi), predict_mean(w, before), strict=True)]
-        rest = [r + _dot(now[i, p:], given) for i, r in enumerate(rest)]
-        alone = predict_mean(rest, unmeasured)
-        held_rows = predict_mean(alone[:n], expected)
-        moved = [select(fresh, rest[i] + _dot(now[i, :p], rows), alone[i]) for i in range(len(x))]
+        x_hat = _sum(x[:n], predict_mean(w[:p], design.T_2))
+        alone = _sum(
+            predict_mean([*x_hat, *x[n:]], Phi_free), predict_mean(w[p:], before_free), predict_mean(given, now_free)
+        )
+        expected = predict_mean(alone[:n], design.C)
+        alone = [*predict_mean(alone[:n], design.T_1), *alone[n:]]
+        taken = _sum(predict_mean(x, Phi), predict_mean(w, before), predict_mean([*rows, *given], now))
+        moved = [select(fresh, a, b) for a, b in zip(taken, alone, strict=True)]
         state: list[Scalar] = [0.0] * n
         for k, index in enumerate(seen):
             state[index] = rows[k] / float(design.C[k, index])
         start = [*predict_mean(state, design.T_1), *([0.0] * len(design.unknown))]
         x = [select(first, start[i], select(begun, moved[i], 0.0)) for i in range(len(x))]
-        taken = [select(fresh, rows[k], select(begun, held_rows[k], 0.0)) for k in range(p)]
-        x_hat = [x[i] + _dot(design.T_2[i], taken) for i in range(n)]
+        outputs = [select(fresh, rows[k], select(begun, expected[k], 0.0)) for k in range(p)]
+        x_hat = _sum(x[:n], predict_mean(outputs, design.T_2))
         # Innovation: against what was expected before the measurement was taken.
         count = both(begun, fresh)
         told = {
-            f"{c}_innovation": select(count, (rows[k] - held_rows[k]) / scale[k], 0.0) for k, c in enumerate(measured)
+            f"{c}_innovation": select(count, (rows[k] - expected[k]) / scale[k], 0.0) for k, c in enumerate(measured)
         }
         there: Scalar = 1.0
         for c in known:
@@ -101,7 +103,7 @@ def pi_observer(
         since = select(lost, 0.0, carry["since"] + dt)
         new = {
             **{f"x_{k}": value for k, value in enumerate(x)},
-            **{f"w_{k}": value for k, value in enumerate([*taken, *given])}, "begun": begun, "since": since, "gap": gap,
+            **{f"w_{k}": value for k, value in enumerate([*outputs, *given])}, "begun": begun, "since": since, "gap": gap,
         }  # fmt: skip
         out = dict(zip((*design.model.states, *design.unknown), [*x_hat, *x[n:]], strict=True))
         return new, {**out, **told, "inputs_known": there, "valid": since >= settle}
@@ -163,18 +165,7 @@ def _state_of_each_output(C: Array) -> list[int]:
     return found
 
 
-def _unmeasured(now: Array, expected: Array, n: int, p: int) -> Array:
-    """What a tick without measurement does to the rest: x = rest + G_1y y with y = expected z solved for x."""
-    size = now.shape[0]
-    feedback = np.zeros((size, size))
-    feedback[:, :n] = now[:, :p] @ expected
-    return np.linalg.inv(np.eye(size) - feedback)
-
-
-def _dot(row: Array, values: Sequence[Scalar]) -> Scalar:
-    """Sum of products; numbers that are 0 cost nothing."""
-    total: Scalar = 0.0
-    for factor, value in zip(row, values, strict=True):
-        if factor != 0:
-            total = total + plain(factor) * value
-    return total
+def _sum(*terms: Sequence[Scalar]) -> list[Scalar]:
+    """Vectors added; those of no known input are empty."""
+    there = [term for term in terms if term]
+    return [sum(entries[1:], entries[0]) for entries in zip(*there, strict=True)]

@@ -98,7 +98,9 @@ def design_pi_observer(
     refuse_undetectable(augmented, unknown)
     if model.D.any():
         raise DesignError(
-            "a plant whose outputs hold an input directly (D is not 0)", "D = 0, as in eq. (30)", "use the Kalman filter"
+            "a plant whose outputs hold an input directly (D is not 0)",
+            "D = 0, as in eq. (30)",
+            "use the Kalman filter",
         )
     n, k, p = len(model.states), len(unknown), len(model.outputs)
     B_v = augmented.A[:n, n:]

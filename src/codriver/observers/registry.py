@@ -13,12 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from codriver.errors import UsageError, VehicleError
 from codriver.names import nearest
 from codriver.observers.observer import Observer
 from codriver.observers.preset_file import find_preset, preset_settings
-from codriver.observers.scaled_gain import Preset, check_tick
+from codriver.observers.scaled_gain import check_tick
 from codriver.vehicles import Vehicle, load_vehicle
 
 ESTIMATORS: dict[str, Estimator] = {}
@@ -31,13 +32,13 @@ class Design:
     Attributes:
         dt: tick, s.
         ell: the knob; None takes the preset's.
-        preset: noise, a paper's or one's own; None where the estimator has none.
+        preset: noise, a paper's or one's own, of the kind that the estimator takes; None where the estimator has none.
         form: "kalman" or "constant", where the estimator has both.
     """
 
     dt: float = 0.01
     ell: float | None = None
-    preset: Preset | None = None
+    preset: Any = None
     form: str = "kalman"
 
 
@@ -54,6 +55,10 @@ class Estimator:
         build: makes the observer. It gets a vehicle with `parameters` if there are any, else perhaps None.
         preset: the noise it takes by default; None: it has no noise to choose.
         knob: whether it has ell.
+        find: reads its kind of preset: a value, a name or a path.
+        tell: what provenance says of such a preset.
+        learns: whether its noise is fitted to the record where no preset is given.
+        forms: the forms it has.
     """
 
     name: str
@@ -64,6 +69,10 @@ class Estimator:
     build: Callable[[Vehicle | None, Design], Observer]
     preset: str | None = None
     knob: bool = False
+    find: Callable[[Any], Any] = find_preset
+    tell: Callable[[Any], dict[str, str]] = preset_settings
+    learns: bool = False
+    forms: tuple[str, ...] = ("kalman", "constant")
 
 
 def register(estimator: Estimator) -> Estimator:
@@ -117,7 +126,7 @@ def build(
     *,
     dt: float = 0.01,
     ell: float | None = None,
-    preset: str | Path | Preset | None = None,
+    preset: Any = None,
     form: str = "kalman",
 ) -> Observer:
     """Build an estimator.
@@ -129,7 +138,7 @@ def build(
         ell: the knob; None takes the preset's (2 for 2017, 1.4 for 2015).
         preset: noise of a paper by its name, or one's own, as a value or the path of its file; None takes the estimator's,
             which is "bisoffi2017" for all of the family intent. (`intent-torque` is of the 2015 paper, whose own noise is
-            "bisoffi2015".)
+            "bisoffi2015".) The family driver-torque has presets of another kind, see `torque_noise` and `driver_torque_family`.
         form: "kalman" (missing and multi-rate rows exact) or "constant" (the papers' gain; small).
 
     Raises:
@@ -143,19 +152,23 @@ def build(
         vehicle = load_vehicle(vehicle)
     if form not in ("kalman", "constant"):
         raise UsageError(f"form '{form}'", "'kalman' or 'constant'", "choose one")
+    if form not in estimator.forms:
+        raise UsageError(f"form '{form}' of {name}", " or ".join(estimator.forms), "leave form (--form) out")
     if estimator.parameters and vehicle is None:
+        needless = [e.name for e in ESTIMATORS.values() if e.family == estimator.family and not e.parameters]
         raise VehicleError(
             f"{name} was given no vehicle", f"one with {', '.join(estimator.parameters)}",
-            "give a built-in name or a vehicle file (--vehicle), or use the estimator 'kinematic', which needs none",
+            "give a built-in name or a vehicle file (--vehicle)"
+            + (f", or use the estimator '{needless[0]}', which needs none" if needless else ""),
         )  # fmt: skip
     if ell is not None and not estimator.knob:
         raise UsageError(f"{name} has no knob, but ell = {ell:g} was given", "no ell", "leave ell (--ell) out")
     if preset is not None and estimator.preset is None:
         raise UsageError(f"{name} has no noise to choose, but a preset was given", "none", "leave it (--preset) out")
     preset = estimator.preset if preset is None else preset
-    noise = None if preset is None else find_preset(preset)
+    noise = None if preset is None else estimator.find(preset)
     observer = estimator.build(vehicle, Design(dt, ell, noise, form))
     settings = {"estimator": name, **observer.settings}
     if noise is not None:
-        settings |= preset_settings(noise)
+        settings |= estimator.tell(noise)
     return replace(observer, name=name, settings=settings)

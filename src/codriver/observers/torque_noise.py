@@ -3,6 +3,7 @@
     order 1   T_dr' = torque * w                    a random walk: a driver who changes the torque at any moment
     order 2   T_dr' = s,  s' = torque * w           an integrated one: a torque that runs on as it does
     omega'  = ... + rate * w                        what jolts the wheel beside all torques
+    delta'  = omega + slip * w                      what the encoder does beside the wheel: play, a soft column
     y       = delta + angle * n                     n of each sample of the encoder
 
 w is white noise of intensity 1, n has variance 1. `codriver tune driver-torque` and `codriver estimate driver-torque` find them by
@@ -12,6 +13,7 @@ maximum likelihood on a record; a file holds them:
     source = "fitted on drive.csv"
     order = 1
     angle = 0.0005     # rad
+    slip = 0.0         # rad per sqrt(s)
     rate = 0.01        # rad/s per sqrt(s)
     torque = 8.0       # N m per sqrt(s); at order 2, N m/s per sqrt(s)
 """
@@ -29,9 +31,9 @@ from codriver.names import nearest
 from codriver.toml_file import parse_tables, read_text
 from codriver.whole_file import write_text
 
-_NUMBERS = ("angle", "rate", "torque")
+_NUMBERS = ("angle", "slip", "rate", "torque")
 _KEYS = ("name", "source", "order", *_NUMBERS)
-_EXPECTED = "name, source, order (1 or 2), angle, rate and torque (numbers; angle and torque above 0)"
+_EXPECTED = "name, source, order (1 or 2), angle, slip, rate and torque (numbers; angle and torque above 0)"
 
 
 @dataclass(frozen=True)
@@ -41,13 +43,15 @@ class TorqueNoise:
     Attributes:
         order: of the torque's random walk, 1 or 2.
         angle: standard deviation of a sample of the angle, rad.
-        rate: square root of the intensity that jolts the rate, rad/s per sqrt(s).
+        slip: square root of the intensity that moves the angle, rad per sqrt(s).
+        rate: of the one that jolts the rate, rad/s per sqrt(s).
         torque: of the one that drives the torque, N m per sqrt(s), or N m/s per sqrt(s) at order 2.
         source, name: where it comes from, and what it is called.
     """
 
     order: int
     angle: float
+    slip: float
     rate: float
     torque: float
     source: str = "given"
@@ -59,20 +63,21 @@ class TorqueNoise:
         Raises:
             UsageError: see there.
         """
-        numbers = (self.angle, self.rate, self.torque)
-        if self.order not in (1, 2) or not all(map(isfinite, numbers)) or min(self.angle, self.torque) <= 0 or self.rate < 0:
+        numbers = (self.angle, self.slip, self.rate, self.torque)
+        sizes = all(map(isfinite, numbers)) and min(self.angle, self.torque) > 0 and min(self.slip, self.rate) >= 0
+        if self.order not in (1, 2) or not sizes:
             raise UsageError(f"order {self.order}, noises {numbers}", _EXPECTED, "correct them")
 
     def settings(self) -> dict[str, str | float]:
         """For provenance."""
         return {
-            "preset": self.name, "order": self.order, "angle_noise": self.angle, "rate_noise": self.rate,
-            "torque_noise": self.torque,
+            "preset": self.name, "order": self.order, "angle_noise": self.angle, "slip_noise": self.slip,
+            "rate_noise": self.rate, "torque_noise": self.torque,
         }  # fmt: skip
 
 
 # Of simulated drivers and an encoder of 0.1 degree: docs/driver-torque.md. A record of one's own gives better ones.
-TORQUE_NOISES = {"driver": TorqueNoise(1, 5e-4, 0.0, 8.0, "simulated drivers, encoder of 0.1 degree", "driver")}
+TORQUE_NOISES = {"driver": TorqueNoise(1, 5e-4, 0.0, 0.0, 8.0, "simulated drivers, encoder of 0.1 degree", "driver")}
 
 
 def find_torque_noise(preset: str | Path | TorqueNoise) -> TorqueNoise:
@@ -85,7 +90,9 @@ def find_torque_noise(preset: str | Path | TorqueNoise) -> TorqueNoise:
         return preset
     if not isinstance(preset, (str, Path)):
         raise UsageError(
-            f"a {type(preset).__name__} as the noise of a steering torque", "a TorqueNoise, a name or a path", "give one"
+            f"a {type(preset).__name__} as the noise of a steering torque",
+            "a TorqueNoise, a name or a path",
+            "give one",
         )
     if str(preset) in TORQUE_NOISES:
         return TORQUE_NOISES[str(preset)]
@@ -113,17 +120,20 @@ def parse_torque_noise(text: str, where: str) -> TorqueNoise:
     faults += [f"'{key}' must be a number" for key in _NUMBERS if not _number(table.get(key, 1.0))]
     if isinstance(table.get("order", 1), bool) or table.get("order", 1) not in (1, 2):
         faults.append("'order' must be 1 or 2")
-    faults += [f"'{key}' must be above 0" for key in ("angle", "torque") if _number(table.get(key)) and not table[key] > 0]
-    if _number(table.get("rate")) and table["rate"] < 0:
-        faults.append("'rate' must not be negative")
+    faults += [
+        f"'{key}' must be above 0" for key in ("angle", "torque") if _number(table.get(key)) and not table[key] > 0
+    ]
+    faults += [
+        f"'{key}' must not be negative" for key in ("slip", "rate") if _number(table.get(key)) and table[key] < 0
+    ]
     if isinstance(table.get("name"), str) and (table["name"] in TORQUE_NOISES or not table["name"].strip()):
         faults.append(f"the name '{table['name']}' is a built-in one, or empty")
     if faults:
         raise UsageError(
             f"{where}: {'; '.join(faults)}", _EXPECTED, "mend the file, or write it with `codriver tune driver-torque`"
         )
-    numbers = (float(table[key]) for key in _NUMBERS)
-    return TorqueNoise(int(table["order"]), *numbers, table["source"], table["name"])
+    angle, slip, rate, torque = (float(table[key]) for key in _NUMBERS)
+    return TorqueNoise(int(table["order"]), angle, slip, rate, torque, table["source"], table["name"])
 
 
 def save_torque_noise(noise: TorqueNoise, path: str | Path) -> None:
@@ -139,7 +149,8 @@ def save_torque_noise(noise: TorqueNoise, path: str | Path) -> None:
     text = (
         f"name = {_quoted(noise.name)}\nsource = {_quoted(noise.source)}\n"
         f"# of the torque's random walk: 1, or 2 for an integrated one\norder = {noise.order}\n"
-        f"angle = {noise.angle!r}  # rad, of a sample\nrate = {noise.rate!r}  # rad/s per sqrt(s)\n"
+        f"angle = {noise.angle!r}  # rad, of a sample\nslip = {noise.slip!r}  # rad per sqrt(s)\n"
+        f"rate = {noise.rate!r}  # rad/s per sqrt(s)\n"
         f"torque = {noise.torque!r}  # {per}\n"
     )
     if replace(parse_torque_noise(text, "the preset"), name=noise.name) != noise:

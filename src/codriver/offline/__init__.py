@@ -1,5 +1,6 @@
 """Estimators that look ahead: functions from a log to an estimate, never live and never exported."""
 
-from codriver.offline.smoother import SmoothedEstimate, smooth
+from codriver.offline.smoothed import SmoothedEstimate
+from codriver.offline.smoother import smooth
 
 __all__ = ["SmoothedEstimate", "smooth"]

@@ -20,11 +20,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from codriver.kernel import Scalar, select
-from codriver.observers.covariance import Matrix, predict_covariance, predict_mean
+from codriver.observers.covariance import Matrix, predict_covariance, predict_mean, symmetric
 from codriver.signals.signal import Array
-
-N = 4
-PAIRS = [(i, j) for i in range(N) for j in range(i, N)]
 
 
 @dataclass(frozen=True)
@@ -36,78 +33,88 @@ class Conditional:
     S: Matrix
 
 
-def identity() -> Conditional:
-    """A state given itself."""
-    return Conditional([[float(i == j) for j in range(N)] for i in range(N)], [0.0] * N, [[0.0] * N for _ in range(N)])
+def pairs(n: int) -> list[tuple[int, int]]:
+    """The upper triangle of n states."""
+    return [(i, j) for i in range(n) for j in range(i, n)]
 
 
-def given_next(x: Sequence[Scalar], P: Matrix, shift: Scalar, last: Scalar, F: Array, Qd: Array) -> Conditional:
+def identity(n: int) -> Conditional:
+    """A state of n numbers given itself."""
+    return Conditional([[float(i == j) for j in range(n)] for i in range(n)], [0.0] * n, [[0.0] * n for _ in range(n)])
+
+
+def given_next(
+    x: Sequence[Scalar], P: Matrix, shift: Sequence[Scalar], last: Scalar, F: Array, Qd: Array
+) -> Conditional:
     """A tick's state given the next tick's.
 
     Args:
         x, P: filtered mean and covariance of the tick.
-        shift: what the known input adds to the first state on the way to the next tick.
+        shift: what known inputs add to each state on the way to the next tick.
         last: 1 where nothing is to be learnt from the next tick: the result is then N(x, P) whatever comes.
         F, Qd: transition and process covariance.
     """
-    ahead = predict_mean(x, F)
-    ahead[0] = ahead[0] + shift
-    FP = [predict_mean([P[k][j] for k in range(N)], F) for j in range(N)]  # column j of F P
+    n = len(x)
+    ahead = [moved + more for moved, more in zip(predict_mean(x, F), shift, strict=True)]
+    FP = [predict_mean([P[k][j] for k in range(n)], F) for j in range(n)]  # column j of F P
     gain = [_solve(predict_covariance(P, F, Qd), column) for column in FP]  # row j of G, since G' = P-^-1 F P
     G: Matrix = [[select(last, 0.0, g) for g in row] for row in gain]
-    left = [[float(i == j) - _dot(G[i], [float(F[k, j]) for k in range(N)]) for j in range(N)] for i in range(N)]
+    left = [[float(i == j) - _dot(G[i], [float(F[k, j]) for k in range(n)]) for j in range(n)] for i in range(n)]
     S = sum_of(congruent(left, P), congruent(G, [[float(q) for q in row] for row in Qd]))
-    return Conditional(G, [x[i] - _dot(G[i], ahead) for i in range(N)], S)
+    return Conditional(G, [x[i] - _dot(G[i], ahead) for i in range(n)], S)
 
 
 def chain_of(first: Conditional, then: Conditional) -> Conditional:
     """x given z, from x given y and y given z."""
-    A = [[_dot(first.A[i], [then.A[k][j] for k in range(N)]) for j in range(N)] for i in range(N)]
+    n = len(first.m)
+    A = [[_dot(first.A[i], [then.A[k][j] for k in range(n)]) for j in range(n)] for i in range(n)]
     m, S = applied(first, then.m, then.S)
     return Conditional(A, m, S)
 
 
 def applied(one: Conditional, m: Sequence[Scalar], S: Matrix) -> tuple[list[Scalar], Matrix]:
     """Mean and covariance of x, where the state it depends on has the mean m and the covariance S."""
-    return [one.m[i] + _dot(one.A[i], m) for i in range(N)], sum_of(one.S, congruent(one.A, S))
+    return [one.m[i] + _dot(one.A[i], m) for i in range(len(m))], sum_of(one.S, congruent(one.A, S))
 
 
 def chosen(when: Scalar, yes: Conditional, no: Conditional) -> Conditional:
     """`yes` where the flag is 1, else `no`."""
-    pick = lambda a, b: [[select(when, a[i][j], b[i][j]) for j in range(N)] for i in range(N)]  # noqa: E731
+    n = len(no.m)
+    pick = lambda a, b: [[select(when, a[i][j], b[i][j]) for j in range(n)] for i in range(n)]  # noqa: E731
     m = [select(when, a, b) for a, b in zip(yes.m, no.m, strict=True)]
     return Conditional(pick(yes.A, no.A), m, pick(yes.S, no.S))
 
 
 def congruent(A: Matrix, S: Matrix) -> Matrix:
     """A S A', symmetric to the last bit."""
-    AS = [[_dot(A[i], [S[k][j] for k in range(N)]) for j in range(N)] for i in range(N)]
-    upper = {(i, j): _dot(AS[i], A[j]) for i, j in PAIRS}
-    return [[upper[min(i, j), max(i, j)] for j in range(N)] for i in range(N)]
+    n = len(S)
+    AS = [[_dot(A[i], [S[k][j] for k in range(n)]) for j in range(n)] for i in range(n)]
+    return symmetric([[_dot(AS[i], A[j]) if i <= j else 0.0 for j in range(n)] for i in range(n)])
 
 
 def sum_of(one: Matrix, other: Matrix) -> Matrix:
     """The sum of two symmetric matrices, symmetric to the last bit."""
-    upper = {(i, j): one[i][j] + other[i][j] for i, j in PAIRS}
-    return [[upper[min(i, j), max(i, j)] for j in range(N)] for i in range(N)]
+    n = len(one)
+    return symmetric([[one[i][j] + other[i][j] if i <= j else 0.0 for j in range(n)] for i in range(n)])
 
 
 def _solve(M: Matrix, b: Sequence[Scalar]) -> list[Scalar]:
     """M^-1 b for a positive definite M, by L D L'."""
-    L: Matrix = [[0.0] * N for _ in range(N)]
+    n = len(b)
+    L: Matrix = [[0.0] * n for _ in range(n)]
     D: list[Scalar] = []
-    for j in range(N):
+    for j in range(n):
         scaled = [L[j][k] * D[k] for k in range(j)]
         D.append(M[j][j] - _dot(L[j][:j], scaled))
         inverse = 1.0 / D[j]
-        for i in range(j + 1, N):
+        for i in range(j + 1, n):
             L[i][j] = (M[i][j] - _dot(L[i][:j], scaled)) * inverse
     y: list[Scalar] = []
-    for i in range(N):
+    for i in range(n):
         y.append(b[i] - _dot(L[i][:i], y))
-    z: list[Scalar] = [0.0] * N
-    for i in reversed(range(N)):
-        z[i] = y[i] * (1.0 / D[i]) - _dot([L[k][i] for k in range(i + 1, N)], z[i + 1 :])
+    z: list[Scalar] = [0.0] * n
+    for i in reversed(range(n)):
+        z[i] = y[i] * (1.0 / D[i]) - _dot([L[k][i] for k in range(i + 1, n)], z[i + 1 :])
     return z
 
 
