@@ -108,6 +108,9 @@ _ENTRIES = (
         100,
     ),
     Quantity(
+        "hands_on", "1", "%", "p_h", "probability that the driver's hands are on the wheel; as truth 0 or 1", 0, 1
+    ),
+    Quantity(
         "rider_torque",
         "N*m",
         "N*m",
@@ -125,10 +128,6 @@ _ENTRIES = (
         -2000,
         2000,
     ),
-    Quantity(
-        "hands_on", "1", "%", "p_h", "probability that the driver's hands are on the wheel; as truth 0 or 1", 0, 1
-    ),
-    Quantity("rider_torque", "N*m", "N*m", "T_r", "torque of the rider's hands on the handlebar", -300, 300),
     Quantity("alignment_torque", "N*m", "N*m", "T_aln", "torque of the tyres on the steering column", -300, 300),
     Quantity(
         "column_torque",

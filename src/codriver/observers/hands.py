@@ -63,14 +63,14 @@ class HandsSettings:
 
     off_dwell: float = 25.0
     on_dwell: float = 35.0
-    quiet_dwell: float = 4.0
-    pulling_dwell: float = 1.2
-    pulling_first: float = 0.25
-    share: float = 0.22
-    floor: float = 0.15
+    quiet_dwell: float = 3.6
+    pulling_dwell: float = 2.6
+    pulling_first: float = 0.05
+    share: float = 0.25
+    floor: float = 0.12
     quiet_torque: float = 0.02
-    pulling_torque: float = 0.7
-    correlation: float = 0.02
+    pulling_torque: float = 1.1
+    correlation: float = 0.027
     cap: float = 20.0
 
     def rates(self) -> Array:

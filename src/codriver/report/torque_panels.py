@@ -43,8 +43,10 @@ def _torque(estimate: Estimate, curves: list[Line | Band], truth: list[Line]) ->
 def _hands(estimate: Estimate) -> Panel | None:
     if "hands_on" not in estimate:
         return None
-    line = Line("probability", np.where(estimate.valid, estimate.columns["hands_on"], np.nan), GREEN, 1.4, legend=False)
-    return Panel("Hands on the wheel: probability", "", 70, (line,), estimate.valid, guides=(0.0, 0.5, 1.0))
+    values = shown("hands_on", np.where(estimate.valid, estimate.columns["hands_on"], np.nan))
+    line = Line("probability", values, GREEN, 1.4, legend=False)
+    title = "Probability that hands are on the wheel"
+    return Panel(title, shown_unit("hands_on"), 70, (line,), estimate.valid, guides=(0.0, 50.0, 100.0))
 
 
 def _column(estimate: Estimate) -> Panel | None:
