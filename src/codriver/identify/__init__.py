@@ -1,5 +1,7 @@
 """Coefficients of a vehicle from its own drives, and whether a vehicle file fits a drive."""
 
+from codriver.identify.alignment import identify_alignment
+from codriver.identify.alignment_result import AlignmentCoefficient, AlignmentFit
 from codriver.identify.brake import identify_brake
 from codriver.identify.brake_fit import BrakeFit, Coefficient, Refusal
 from codriver.identify.check_log import check_vehicle_against_log
@@ -11,6 +13,8 @@ from codriver.identify.steering_wheel import identify_steering_wheel
 from codriver.identify.torque_scale import TorqueScale, identify_torque_scale
 
 __all__ = [
+    "AlignmentCoefficient",
+    "AlignmentFit",
     "BrakeFit",
     "Coefficient",
     "GearRatio",
@@ -21,6 +25,7 @@ __all__ = [
     "SteeringFit",
     "TorqueScale",
     "check_vehicle_against_log",
+    "identify_alignment",
     "identify_brake",
     "identify_pedal",
     "identify_ratio",
