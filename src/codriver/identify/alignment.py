@@ -12,6 +12,8 @@ road, and made held-out drives worse.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -59,10 +61,12 @@ def identify_alignment(
     if not logs:
         raise LogError("no drive", "at least one", "give recordings with a measured torque")
     assumed = {name: USUAL[name] for name in GEOMETRY if vehicle is None or name not in vehicle}
-    own = {name: vehicle.number(name) if vehicle is not None and name in vehicle else USUAL[name] for name in GEOMETRY}
+    own: dict[str, Any] = {
+        name: vehicle.number(name) if vehicle is not None and name in vehicle else USUAL[name] for name in GEOMETRY
+    }
     start = AlignmentModel(USUAL["alignment_gain"], **own)
     drives = [alignment_drive(log, start, rate) for log in logs]
-    source = ", ".join(d.source or f"drive {k + 1}" for k, d in enumerate(drives))
+    source = ", ".join(Path(d.source).name or f"drive {k + 1}" for k, d in enumerate(drives))
     refuse_sign(drives)
     _refuse_straight(drives, source)
     fit, lost = fit_told([(d, d.keep) for d in drives], start)

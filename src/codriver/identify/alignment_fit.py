@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import exp, log
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +40,7 @@ LETTERS = {
     "w": ("width", "steering_friction_width", 1.0, "rad"),
 }
 TOLD = 0.5  # of the prior's width
-BLOCK = 20.0  # s
+BLOCK, LEAST_BLOCKS = 20.0, 3  # s, and blocks a coefficient that shorten them in a short drive
 START = (0.3, 3.0)  # s, N m, and tau, s
 ROUNDS = 3
 Chosen = Sequence[tuple[Drive, Flags]]
@@ -65,21 +66,21 @@ class MapFit:
     sd: float
     time: float
 
-    def told(self) -> tuple[str, ...]:
-        """Letters that the drives tell."""
-        return tuple(letter for letter, sd in zip(self.free, self.sd_x, strict=True) if sd < TOLD * LETTERS[letter][2])
+    def worst(self) -> str | None:
+        """The letter that the drives tell least, if they do not tell it."""
+        doubt = self.sd_x / [LETTERS[letter][2] for letter in self.free]
+        # Where nothing is told, the gain is what is least in doubt.
+        k = len(self.free) - 1 - int(np.argmax(doubt[::-1]))
+        return self.free[k] if not doubt[k] < TOLD else None
 
 
-def fit_map(
-    rows: Chosen, start: AlignmentModel, free: Sequence[str] = tuple(LETTERS), guess: MapFit | None = None
-) -> MapFit:
+def fit_map(rows: Chosen, start: AlignmentModel, free: Sequence[str] = tuple(LETTERS)) -> MapFit:
     """Fit.
 
     Args:
         rows: drives, and which rows of each count.
         start: what is not fitted; geometry counts.
         free: letters to fit.
-        guess: a fit to start from, of the same letters.
     """
     from scipy.optimize import least_squares
 
@@ -87,9 +88,8 @@ def fit_map(
     middle = np.array([_inner(letter, USUAL[LETTERS[letter][1]]) for letter in free])
     width = np.array([LETTERS[letter][2] for letter in free])
     slides = _Slides()
-    sd, time = (guess.sd, guess.time) if guess is not None else START
-    u = (guess.x - middle) / width if guess is not None else np.zeros(len(free))
-    for _ in range(ROUNDS if guess is None else 1):
+    (sd, time), u = START, np.zeros(len(free))
+    for _ in range(ROUNDS):
         weights = [np.sqrt(drive.dt / (2 * time)) / sd for drive, _ in rows]
 
         def left(u: Array, weights: list[float] = weights) -> Array:
@@ -107,14 +107,18 @@ def fit_map(
 
 
 def fit_told(rows: Chosen, start: AlignmentModel) -> tuple[MapFit, tuple[str, ...]]:
-    """The fit of what the drives tell, and the letters that they do not; those are as usual."""
-    fit = fit_map(rows, start)
-    refused: tuple[str, ...] = ()
-    while (lost := tuple(letter for letter in fit.free if letter not in fit.told())) and len(lost) < len(fit.free):
-        refused += lost
-        usual = {LETTERS[letter][0]: USUAL[LETTERS[letter][1]] for letter in refused}
+    """The fit of what the drives tell, and the letters that they do not; those are as usual.
+
+    What is told least goes first, since the others can be told better then.
+    """
+    fit, refused = fit_map(rows, start), []
+    while (lost := fit.worst()) is not None:
+        refused.append(lost)
+        if lost == "k_a":
+            break
+        usual: dict[str, Any] = {LETTERS[letter][0]: USUAL[LETTERS[letter][1]] for letter in refused}
         fit = fit_map(rows, replace(start, **usual), [letter for letter in LETTERS if letter not in refused])
-    return fit, refused + (lost if len(lost) == len(fit.free) else ())
+    return fit, tuple(refused)
 
 
 def modelled(drive: Drive, model: AlignmentModel) -> Array:
@@ -166,11 +170,12 @@ def _standard_errors(rows: Chosen, jacobian: Array, residual: Array) -> Array:
     size = np.sqrt(np.maximum(np.diag(curvature), 1e-300))
     if np.linalg.cond(curvature / size / size[:, None]) > 1e10:
         return np.full(p, np.inf)
+    span = min(BLOCK, sum(drive.dt * keep.sum() for drive, keep in rows) / (LEAST_BLOCKS * p))
     sums, first = [], p
     for drive, keep in rows:
         count = int(keep.sum())
         scores = jacobian[first : first + count] * residual[first : first + count, None]
-        length = max(round(BLOCK / drive.dt), 1)
+        length = max(round(span / drive.dt), 1)
         sums.append(np.add.reduceat(scores, np.arange(max(count // length, 1)) * length, axis=0))
         first += count
     blocks = np.vstack(sums)
@@ -188,7 +193,7 @@ def _inner(letter: str, value: float) -> float:
 
 def _model(start: AlignmentModel, free: Sequence[str], x: Array) -> AlignmentModel:
     """The map with these coefficients; logarithms are kept where exp is a number."""
-    values = {
+    values: dict[str, Any] = {
         LETTERS[letter][0]: float(v) if letter == "T_0" else exp(min(max(float(v), -30.0), 30.0))
         for letter, v in zip(free, x, strict=True)
     }
