@@ -82,7 +82,7 @@ def fit_torque_noise(name: str, log: Log, vehicle: Vehicle, rate: float, label: 
     run = compile(observer, wanted).run(log)
     grid = run.grid
     rows = _rows(run.columns, grid)
-    J, b = vehicle.number("steering_inertia"), vehicle.number("steering_damping")
+    J, b = float(observer.settings["J_s"]), float(observer.settings["b_s"])
     counted = rows.counted
     if counted.sum() < LEAST_ROWS:
         raise LogError(
