@@ -15,8 +15,8 @@ an encoder's last digit does:
 
 A wheel that sticks can hold any torque up to T_c, and what it holds soon has nothing to do with how it came to rest: so z
 fades, and the variance of T_f is T_c^2 (1 - z^2) / 3 + (sd of T_c)^2 z^2, that of a uniform torque where z = 0. REST is from
-simulated drivers: docs/driver-torque.md. Errors of torque_scale and torque_offset are in the variance, too. A car's map has its own friction, and its error is known as a whole, from drives it
-was not fitted to.
+simulated drivers: docs/driver-torque.md. Errors of torque_scale and torque_offset are in the variance, too. A car's map has its
+own friction, and its error is known as a whole, from drives it was not fitted to.
 Dahl 1968 (Aerospace Corporation, TOR-0158(3107-18)-1).
 """
 
@@ -155,7 +155,7 @@ def friction_unsaid(vehicle: Vehicle) -> list[Finding]:
     if "steering_friction" in vehicle:
         return []
     return [Finding(
-        "warn", f"vehicle '{vehicle.name}' has no steering_friction: what friction holds counts as the driver's torque, and is not in "
+        "warn", f"vehicle '{vehicle.name}' has no steering_friction: what friction holds counts as the driver's torque, outside "
         "the band; codriver identify steering-wheel finds it, 0 says there is none",
     )]  # fmt: skip
 
