@@ -185,6 +185,8 @@ def main(drives: int) -> None:
         seen = estimated(600, drives, WALKS[1], setting)
         share = loss(np.full(seen.on.shape, seen.on.mean()), seen.on)
         ways = {name: HandsSettings()}
+        if name == "hands mostly resting":
+            ways["the same, quiet_dwell 12 s"] = HandsSettings(quiet_dwell=12.0)
         if name.startswith(("tyre", "friction")):
             known = estimated(700, 4, WALKS[1], setting)
             off = (known.on == 0) & (known.valid > 0)
