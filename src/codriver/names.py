@@ -107,7 +107,9 @@ _ENTRIES = (
         -100,
         100,
     ),
-    Quantity("hands_on", "1", "%", "p_h", "probability that the driver's hands are on the wheel; as truth 0 or 1", 0, 1),
+    Quantity(
+        "hands_on", "1", "%", "p_h", "probability that the driver's hands are on the wheel; as truth 0 or 1", 0, 1
+    ),
     Quantity(
         "rider_torque",
         "N*m",
