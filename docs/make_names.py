@@ -14,6 +14,10 @@ import sys
 from collections import Counter
 from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from codriver.vehicles import Vehicle
 
 DOCS = Path(__file__).parent
 _MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -59,17 +63,32 @@ def operations() -> list[list[str]]:
     from codriver.observers import ESTIMATORS
 
     head = ["estimator", "form", "operations", "+ -", "*", "/", "sqrt", "compare, select, logic", "state"]
-    car, rows = cd.load_vehicle("bisoffi2017"), []
-    for name in ESTIMATORS:
-        for form in ("kalman", "constant"):
+    car, rows = _every_parameter(), []
+    for name, estimator in ESTIMATORS.items():
+        for form in estimator.forms:
             step = cd.build(name, car, form=form).record()
             kinds = Counter(i.kind for i in step.instructions)
             groups = (("add", "sub", "neg", "twice"), ("mul", "square"), ("div", "inverse"), ("sqrt",))
             counts = [sum(kinds[kind] for kind in group) for group in groups]
             rest = step.operations() - sum(counts)
-            label = form if name != "pedals-only" else "-"
+            label = "-" if name in ("pedals-only", "driver-torque-pi") else form
             rows.append([f"`{name}`", label, *(str(n) for n in (step.operations(), *counts, rest, len(step.carry)))])
     return [head, *(row for k, row in enumerate(rows) if row not in rows[:k])]
+
+
+def _every_parameter() -> Vehicle:
+    """The car of 2017 with a steering that has everything; what a step costs does not depend on the numbers."""
+    import codriver as cd
+    from codriver.models.alignment import USUAL
+
+    car = cd.load_vehicle("bisoffi2017")
+    track = {
+        "yaw_inertia": 2600.0, "front_axle_distance": 1.2, "front_cornering_stiffness": 9e4, "rear_cornering_stiffness": 1.1e5,
+        "alignment_stiffness": 1000.0, "steering_inertia": 0.03, "torque_scale": 1.9, "steering_end_stop": 8.0,
+    }  # fmt: skip
+    for name, value in {**USUAL, **track}.items():
+        car = car.with_parameter(name, value, 0.05 * value)
+    return car
 
 
 _TABLES = {"vocabulary": vocabulary, "parameters": parameters, "operations": operations}

@@ -13,6 +13,7 @@ from codriver.trust import Check
 
 SPEED = "longitudinal_speed"
 SHARES = ("braking", "both_pedals", "standstill")
+HANDS = "hands_on"  # a probability; counted where it is above 0.5
 MOST_SPANS = 3  # named in a line of text; more are for the report
 
 
@@ -45,7 +46,7 @@ class Summary:
         valid_share: share of the ticks that are valid.
         estimates: figures of each estimate, by its name.
         gear_shifts: their number; None where the estimator has no such flag.
-        shares: of the ticks, by flag: those of SHARES that the estimator has.
+        shares: of the ticks, by flag: those of SHARES that the estimator has; `hands_on` of the valid ticks.
     """
 
     duration: float
@@ -81,14 +82,18 @@ def summarise(estimate: Estimate) -> Summary:
     if "gear_shift" in estimate:
         # Those that begin within the drive: a clutch that is open at the start is no shift.
         shifts = int(np.sum(np.diff(estimate.flag("gear_shift").astype(int)) == 1))
+    shares = {flag: float(estimate.flag(flag).mean()) if n else 0.0 for flag in SHARES if flag in estimate}
+    if HANDS in estimate and valid.any():
+        # A probability has no size to sum up; how often hands are on is what a reader wants.
+        shares[HANDS] = float((estimate.columns[HANDS][valid] > 0.5).mean())
     return Summary(
         n * estimate.grid.dt,
         1 / estimate.grid.dt,
         _distance(estimate),
         float(valid.mean()) if n else 0.0,
-        {output.name: _figures(estimate, output.name, output.unit) for output in estimate.estimates},
+        {o.name: _figures(estimate, o.name, o.unit) for o in estimate.estimates if o.name != HANDS},
         shifts,
-        {flag: float(estimate.flag(flag).mean()) if n else 0.0 for flag in SHARES if flag in estimate},
+        shares,
     )
 
 

@@ -118,7 +118,7 @@ def check_estimate(
                 "time, more than any road: "
                 + ("is its axis, unit or sign right?" if always else "a slide, a crash, a bad sensor?"), _spans(steep, grid),
             ))  # fmt: skip
-    findings += [*_driver(values, valid, grid), *pedals_move(log, grid.values)]
+    findings += [*_driver(values, valid, grid), *pedals_move(log, grid.values), *_angle(values, grid, log)]
     absurd = Log({name: log[name] for name in grid.values if name in log}).implausible()
     findings += [Finding("bad" if fault in absurd else "warn", fault) for fault in log.faults]
     order = {"bad": 0, "warn": 1, "ok": 2}
@@ -147,6 +147,46 @@ def _driver(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Gri
                 f"{size:.3g} m/s^2: a wrong unit or scale of torque or pedal, a wrong gear, or another vehicle's parameters",
             ))  # fmt: skip
     return findings
+
+
+def _angle(values: Mapping[str, Array], grid: Grid, log: Log) -> list[Finding]:
+    """What a steering wheel's encoder did that no wheel does, for estimators that tell."""
+    findings = []
+    if "angle_jump" in values and (jumps := int((values["angle_jump"] > 0.5).sum())):
+        findings.append(Finding(
+            "warn", f"the angle jumps {jumps} time{'s' * (jumps > 1)}: encoder, a wrong sample, or a blow; begun anew there",
+             _spans(values["angle_jump"] > 0.5, grid),
+        ))  # fmt: skip
+    if "angle_turns" in values and np.any(values["angle_turns"] != 0):
+        wraps = int((np.diff(values["angle_turns"]) != 0).sum())
+        findings.append(Finding("warn", f"the angle wraps {wraps} times by a turn; taken out"))
+    if "at_end_stop" in values and (share := float((values["at_end_stop"] > 0.5).mean())):
+        findings.append(Finding(
+            "warn", f"the wheel is at its end stop for {share:.1%} of the time: nobody knows what the stop bears",
+            _spans(values["at_end_stop"] > 0.5, grid),
+        ))  # fmt: skip
+    if "angle_jump" in values and "steering_wheel_angle" in grid.values:
+        angle = grid.values["steering_wheel_angle"]
+        rests = _rests_at_its_end(angle[grid.fresh["steering_wheel_angle"]], grid.dt)
+        if rests:
+            findings.append(Finding(
+                "warn", f"the angle rests exactly at its greatest or least value for {rests:.1f} s: a saturated sensor or an end "
+                "stop? The torque there is not the driver's; set steering_end_stop in the vehicle file",
+            ))  # fmt: skip
+    return findings
+
+
+def _rests_at_its_end(angle: Array, dt: float) -> float:
+    """Seconds for which an angle rests at its extremes, in rests of a second or more, far from where it mostly is."""
+    if angle.size < FEW or not np.ptp(angle) > 0:
+        return 0.0
+    total, middle, usual = 0, float(np.median(angle)), float(np.quantile(np.abs(angle - np.median(angle)), 0.9))
+    for end in (angle.max(), angle.min()):
+        if abs(end - middle) < 1.2 * usual:
+            continue
+        edges = np.flatnonzero(np.diff(np.r_[0, (angle == end).astype(np.int8), 0]))
+        total += sum(int(b - a) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a) * dt >= 1.0)
+    return total * dt
 
 
 def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid) -> Finding:

@@ -19,7 +19,7 @@ from codriver.cli import (
     demo,
     estimate,
     export,
-    identify_steering,
+    identify_alignment,
     info,
     reproduce,
     simulate,
@@ -42,7 +42,7 @@ app.command("demo")(demo.demo)
 app.command("info")(info.info)
 app.command("estimate")(estimate.estimate)
 app.command("smooth")(smooth.smooth)
-app.add_typer(identify_steering.app, name="identify")
+app.add_typer(identify_alignment.app, name="identify")
 app.command("tune")(tune.tune)
 app.command("style")(style.style)
 app.add_typer(check.app, name="check")

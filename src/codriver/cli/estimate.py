@@ -153,6 +153,7 @@ def check_with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> C
     if vehicle is None:
         return check
     from codriver.identify import check_vehicle_against_log
+    from codriver.observers.column import friction_unsaid
     from codriver.observers.gears import unknown_gears
 
     said = {f.text for f in check.findings}
@@ -162,6 +163,7 @@ def check_with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> C
         [
             *(replace(f, text=f"vehicle file: {f.text}") for f in found),
             *(unknown_gears(log, vehicle) if "gear" in result.grid.values else []),
+            *(friction_unsaid(vehicle) if "column_torque" in result else []),
             *check.findings,
         ],
         key=lambda f: order[f.severity],
@@ -202,14 +204,17 @@ def _write(result: Estimate, check: Check, out: Path, report: Path | None, comma
 
 def _told(result: Estimate, check: Check, out: Path, report: Path | None, why: str) -> dict[str, object]:
     """What the terminal shows and --json prints."""
+    from codriver.measured_torque import compare_with_sensor
     from codriver.summary import summarise, tell_findings
 
+    sensor = compare_with_sensor(result)
     return {
         "estimator": result.observer,
         "why": why,
         "settings": dict(result.provenance),
         "log": result.log.source,
         **summarise(result).to_dict(),
+        "sensor": {**vars(sensor), "text": sensor.told()} if sensor is not None else None,
         "verdict": check.verdict,
         "findings": tell_findings(check),
         "result": str(out),

@@ -33,7 +33,8 @@ def export_c_files(
 
     if estimator in families():
         raise UsageError(
-            f"'{estimator}' stands for whatever a log can feed", "one estimator",
+            f"'{estimator}' stands for whatever a log can feed",
+            "one estimator",
             f"name one: {', '.join(e.name for e in ESTIMATORS.values() if e.family == estimator)}",
         )
     car = load_vehicle(vehicle) if vehicle is not None else None

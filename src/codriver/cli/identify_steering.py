@@ -188,8 +188,8 @@ def _write(new: Vehicle, document: Document, out: Path, report: Path | None, ove
             draft.unlink(missing_ok=True)
 
 
-def _say(head: str, rows: list[tuple[str, ...]] | Any, told: dict[str, Any]) -> None:
-    """What was found, as a table."""
+def _say(head: str, rows: list[tuple[str, ...]] | Any, told: dict[str, Any], more: Any = None) -> None:
+    """What was found, as a table; perhaps one more table before the verdict."""
     from rich.markup import escape
     from rich.table import Table
 
@@ -208,6 +208,9 @@ def _say(head: str, rows: list[tuple[str, ...]] | Any, told: dict[str, Any]) -> 
         out.print(
             f"{name}: {numbers}" + (f"converged in pass {p['passes']}" if p["converged"] else escape(p["why_not"]))
         )
+    if more is not None:
+        out.print()
+        out.print(more)
     if told["findings"]:
         out.print("\n[bold]verdict[/]:")
         say_findings(out, told["findings"])

@@ -55,6 +55,61 @@ def track(
     )
 
 
+@app.command("rig")
+def rig(out: Out, seed: Seed = 0, duration: Duration = None, overwrite: Overwrite = False) -> None:
+    """Record at a driving simulator: weights on its wheel, a chirp of its motor, and three minutes by a driver.
+
+    The wheel is the one of the 2019 paper with some friction; it measures its angle in steps of 0.1 degree, and no torque.
+
+    Example: codriver simulate rig -o rig
+    """
+    from dataclasses import replace
+
+    from codriver.cli.terminal import console
+    from codriver.errors import UsageError
+    from codriver.simulate.folder import refuse_foreign
+    from codriver.simulate.rig import RigSetting
+    from codriver.simulate.rig_files import FILES, write_rig
+
+    refuse_foreign(out, "rig", FILES)
+    _refuse_earlier(out, overwrite)
+    setting = RigSetting()
+    if duration is not None:
+        if not 5 <= duration <= 3600:
+            raise UsageError(f"--duration {duration:g}", "5 to 3600 s", "choose one of these")
+        setting = replace(setting, seconds=duration)
+    files, drive = write_rig(out, setting, seed)
+    wheel, torque = setting.wheel, drive.driver_torque
+    console().print(
+        f"a force-feedback wheel: J_s {wheel.inertia:g} kg m^2, b_s {wheel.damping:g} N m s/rad, T_c {wheel.friction:g} N m, "
+        f"torque {setting.torque_scale:g} command + {setting.torque_offset:g} N m\n"
+        f"{drive.time[-1]:.0f} s at {setting.car.speed * 3.6:.0f} km/h, driver's torque {torque.std():.2f} N m (rms), seed {seed}\n"
+        f"wrote {', '.join(str(p) for p in vars(files).values())}\n\n"
+        f"then: codriver identify torque-scale {files.weights} -o {out / 'scale.toml'}\n"
+        f"      codriver identify steering-wheel {files.chirp} --names {files.names} --vehicle {out / 'scale.toml'} "
+        f"-o {out / 'wheel.toml'}\n"
+        f"      codriver estimate driver-torque {files.drive} --names {files.names} --vehicle {out / 'wheel.toml'} "
+        f"-o {out / 'torque.parquet'} --report {out / 'torque.html'}",
+        markup=False,
+    )
+
+
+def _refuse_earlier(out: Path, overwrite: bool) -> None:
+    """Refuse a folder that holds files, where they are not to be replaced.
+
+    Raises:
+        UsageError: see there.
+    """
+    from codriver.errors import UsageError
+
+    if not overwrite and out.is_dir() and any(out.iterdir()):
+        raise UsageError(
+            f"--out {out} holds an earlier simulation",
+            "a new or empty folder",
+            "choose another --out, or say --overwrite",
+        )
+
+
 def _simulate(
     out: Path, drive: Callable[[], RoadTest], vehicle: str, nominal: Vehicle | None, overwrite: bool
 ) -> None:  # fmt: skip
@@ -62,16 +117,10 @@ def _simulate(
     import shlex
 
     from codriver.cli.terminal import console, working
-    from codriver.errors import UsageError
     from codriver.simulate import refuse_foreign, write_drive
 
     refuse_foreign(out, "simulated drive")
-    if not overwrite and out.is_dir() and any(out.iterdir()):
-        raise UsageError(
-            f"--out {out} holds an earlier simulation",
-            "a new or empty folder",
-            "choose another --out, or say --overwrite",
-        )
+    _refuse_earlier(out, overwrite)
     with working(True, 2) as stage:
         stage("driving")
         test = drive()

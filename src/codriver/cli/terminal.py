@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
+# Of an estimate's settings, those that are told, in this order.
+SETTINGS = ("vehicle", "known_torque", "ell", "preset", "order", "form", "smoother")
 _STYLE = {"ok": "green", "warn": "yellow", "bad": "red"}
 
 
@@ -57,9 +59,7 @@ def say(summary: dict[str, Any]) -> None:
 
     out = console()
     settings = summary["settings"]
-    parts = [
-        f"{key} {_short(settings[key])}" for key in ("vehicle", "known_torque", "ell", "preset", "order", "form", "smoother") if key in settings
-    ]
+    parts = [f"{key} {_short(settings[key])}" for key in SETTINGS if key in settings]
     out.print(
         f"[bold]{summary['estimator']}[/] on {escape(summary['log'])}" + (f": {', '.join(parts)}" if parts else "")
     )
@@ -68,6 +68,7 @@ def say(summary: dict[str, Any]) -> None:
     distance = f", {summary['distance_m'] / 1000:.2f} km" if summary["distance_m"] is not None else ""
     extra = f", {summary['gear_shifts']} gear shifts" if summary.get("gear_shifts") else ""
     extra += f", braking {summary['braking_share']:.0%}" if summary.get("braking_share") else ""
+    extra += f", hands on {summary['hands_on_share']:.0%}" if "hands_on_share" in summary else ""
     out.print(
         f"{summary['duration_s']:.1f} s{distance} at {summary['rate_hz']:g} Hz, valid {summary['valid_share']:.0%}{extra}\n"
     )
@@ -78,6 +79,8 @@ def say(summary: dict[str, Any]) -> None:
         numbers = [f"{row[key]:.3f}" if row[key] is not None else "-" for key in ("rms", "p5", "p95", "mean_sd")]
         table.add_row(name, str(row["unit"]), *numbers)
     out.print(table)
+    if summary["sensor"] is not None:
+        out.print(f"\n{escape(summary['sensor']['text'])}")
     out.print(f"\n[bold]verdict[/]: {summary['verdict']}")
     say_findings(out, summary["findings"])
     out.print(

@@ -1,5 +1,7 @@
 """Coefficients of a vehicle from its own drives, and whether a vehicle file fits a drive."""
 
+from codriver.identify.alignment import identify_alignment
+from codriver.identify.alignment_result import AlignmentCoefficient, AlignmentFit
 from codriver.identify.brake import identify_brake
 from codriver.identify.brake_fit import BrakeFit, Coefficient, Refusal
 from codriver.identify.check_log import check_vehicle_against_log
@@ -12,6 +14,8 @@ from codriver.identify.steering_wheel import identify_steering_wheel
 from codriver.identify.torque_scale import TorqueScale, identify_torque_scale
 
 __all__ = [
+    "AlignmentCoefficient",
+    "AlignmentFit",
     "BrakeFit",
     "Coefficient",
     "GearRatio",
@@ -25,6 +29,7 @@ __all__ = [
     "TorqueScale",
     "check_vehicle_against_log",
     "fit_steer_row",
+    "identify_alignment",
     "identify_brake",
     "identify_pedal",
     "identify_ratio",

@@ -1,14 +1,18 @@
 """Plants: one a file; what observers are designed on."""
 
+from codriver.models.alignment import AlignmentModel
 from codriver.models.bicycle import BicycleMatrices, BicycleParameters, bicycle_matrices, bicycle_model
 from codriver.models.longitudinal import intention_model
+from codriver.models.single_track import SingleTrack
 from codriver.models.state_space import StateSpace
 from codriver.models.steer_row import SteerMotion, SteerRow
 from codriver.models.steering import steering_model
 
 __all__ = [
+    "AlignmentModel",
     "BicycleMatrices",
     "BicycleParameters",
+    "SingleTrack",
     "StateSpace",
     "SteerMotion",
     "SteerRow",

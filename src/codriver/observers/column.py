@@ -5,29 +5,36 @@
     logged     T_aln = alignment_torque                               a simulator's log
     motor      T_aln = steering_motor_torque                          a force-feedback wheel: the motor is all that acts
     command    T_aln = torque_scale T_com + torque_offset             the same, in the device's own unit (89)
+    map        T_aln of `models.alignment`, from angle and speed      a car: tyres less assist, as hands feel them
+    track      (92) with a single track, from angle and speed         a car whose tyres are known
 
-Friction is Dahl's: its state z runs towards the direction of motion within the presliding angle d, so a wheel that rests keeps
-the torque it came to rest with, and nothing chatters when an encoder's last digit does:
+Friction of the first three is Dahl's: its state z runs towards the direction of motion within the angle w, so nothing chatters when
+an encoder's last digit does:
 
-    z <- sgn + (z - sgn) exp(-|Delta delta| / d),   T_f = T_c z
+    z <- (z + m / w) / (1 + |m| / w) when the wheel moves by m,   z <- z exp(-dt / REST) while it rests,   T_f = T_c z
 
-A wheel that sticks can hold any torque up to T_c: the variance of T_f is T_c^2 (1 - z^2) / 3 + (sd of T_c)^2 z^2, that of a
-uniform torque where z = 0. Dahl 1968 (Aerospace Corporation, TOR-0158(3107-18)-1).
+A wheel that sticks can hold any torque up to T_c, and what it holds soon has nothing to do with how it came to rest: so z
+fades, and the variance of T_f is T_c^2 (1 - z^2) / 3 + (sd of T_c)^2 z^2, that of a uniform torque where z = 0. REST is from
+simulated drivers: docs/driver-torque.md. Errors of torque_scale and torque_offset are in the variance, too. A car's map has its own friction, and its error is known as a whole, from drives it
+was not fitted to.
+Dahl 1968 (Aerospace Corporation, TOR-0158(3107-18)-1).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import pi
-from typing import Any
+from math import exp, pi
 
+from codriver.finding import Finding
 from codriver.kernel import Scalar, select
+from codriver.models.alignment import AlignmentModel
 from codriver.observers.observer import Scalars
 from codriver.vehicles import Vehicle
 
-PRESLIDING = 0.2 * pi / 180  # rad, where the vehicle file says nothing
+WIDTH = 0.2 * pi / 180  # rad, where the vehicle file says nothing
 FRICTION_SD = 0.1  # of T_c, where the vehicle file says nothing
+REST = 0.5  # s, in which a resting wheel forgets how it came to rest
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,7 @@ class Column:
             sample, 0 on ticks without one.
         settings: for provenance.
         optional: those of the inputs that need not be there.
+        error: standard deviation of the torque's error that stays for long, N m.
     """
 
     inputs: tuple[str, ...]
@@ -65,28 +73,39 @@ class Column:
     at: Callable[[Scalars, Scalars, Scalars, Scalar, Scalar], Moment]
     settings: Mapping[str, str | float]
     optional: frozenset[str] = frozenset()
+    error: float = 0.0
 
 
-def logged_column(vehicle: Vehicle, name: str = "alignment_torque") -> Column:
+def logged_column(vehicle: Vehicle, dt: float, name: str = "alignment_torque") -> Column:
     """The torque that the log holds under a name, less friction.
 
     Args:
         vehicle: with steering_friction, if there is friction; with torque_scale for `steering_motor_command`.
+        dt: tick, s.
         name: "alignment_torque", "steering_motor_torque" or "steering_motor_command".
     """
-    scale, offset = 1.0, 0.0
+    scale, offset, sd_scale, sd_offset = 1.0, 0.0, 0.0, 0.0
     if name == "steering_motor_command":
-        scale = vehicle.number("torque_scale")
-        offset = vehicle.number("torque_offset") if "torque_offset" in vehicle else 0.0
-    rubbing = friction_of(vehicle)
+        scale, sd_scale = _with_sd(vehicle, "torque_scale")
+        offset, sd_offset = _with_sd(vehicle, "torque_offset")
+    rubbing = friction_of(vehicle, dt)
 
     def at(carry: Scalars, u: Scalars, ok: Scalars, angle: Scalar, moved: Scalar) -> Moment:
         there = ok[name]
-        torque = scale * select(there, u[name], 0.0) + offset
+        value = select(there, u[name], 0.0)
         z, against, variance = rubbing.at(carry["bristle"], moved)
-        return Moment(torque - against, variance, there, {"bristle": z})
+        variance = variance + (sd_scale * value) * (sd_scale * value) + sd_offset**2
+        return Moment(scale * value + offset - against, variance, there, {"bristle": z})
 
     return Column((name,), {"bristle": 0.0}, at, {"known_torque": name, **rubbing.settings})
+
+
+def _with_sd(vehicle: Vehicle, name: str) -> tuple[float, float]:
+    """A parameter and its standard deviation; 0 where there is none."""
+    if name not in vehicle:
+        return 0.0, 0.0
+    sd = vehicle.parameters[name].sd
+    return vehicle.number(name), float(sd) if isinstance(sd, (int, float)) else 0.0
 
 
 @dataclass(frozen=True)
@@ -96,20 +115,21 @@ class Friction:
     Attributes:
         level: T_c, N m.
         sd: of T_c, N m.
-        width: presliding angle d, rad.
+        width: w, rad.
+        keep: what is left of z after a tick at rest.
     """
 
     level: float
     sd: float
     width: float
+    keep: float
 
     def at(self, z: Scalar, moved: Scalar) -> tuple[Scalar, Scalar, Scalar]:
         """The new state, the torque against the motion (N m) and its variance, after the wheel moved by so much (rad)."""
         if self.level == 0:
             return z, 0.0, 0.0
-        size = select(moved < 0, -moved, moved)
-        direction = select(moved < 0, -1.0, 1.0)
-        new = direction + (z - direction) * _exponential(-size / self.width)
+        size = select(moved < 0, -moved, moved) / self.width
+        new = select(size > 0, (z + moved / self.width) / (1.0 + size), self.keep * z)
         square = new * new
         spread = self.level**2 / 3.0
         return new, self.level * new, spread * (1.0 - square) + self.sd**2 * square
@@ -120,21 +140,76 @@ class Friction:
         return {"friction": self.level} if self.level else {}
 
 
-def friction_of(vehicle: Vehicle) -> Friction:
-    """The friction of a vehicle file; none where it has none."""
+def friction_of(vehicle: Vehicle, dt: float) -> Friction:
+    """The friction of a vehicle file, for a tick, s; none where it has none."""
     level = vehicle.number("steering_friction") if "steering_friction" in vehicle else 0.0
     given = vehicle.parameters["steering_friction"].sd if level else None
     sd = float(given) if isinstance(given, (int, float)) else FRICTION_SD * level
-    width = vehicle.number("steering_presliding") if "steering_presliding" in vehicle else PRESLIDING
-    return Friction(level, sd, width)
+    name = "steering_friction_width"
+    width = vehicle.number(name) if name in vehicle else WIDTH
+    return Friction(level, sd, width, exp(-dt / REST))
 
 
-def _exponential(x: Any) -> Any:
-    """exp, of a number or a symbol."""
-    if isinstance(x, (int, float)):
-        from math import exp
+def friction_unsaid(vehicle: Vehicle) -> list[Finding]:
+    """A warning where the vehicle file does not say whether the column has friction: it would count as the driver's torque."""
+    if "steering_friction" in vehicle:
+        return []
+    return [Finding(
+        "warn", f"vehicle '{vehicle.name}' has no steering_friction: what friction holds counts as the driver's torque, and is not in "
+        "the band; codriver identify steering-wheel finds it, 0 says there is none",
+    )]  # fmt: skip
 
-        return exp(x)
-    import casadi
 
-    return casadi.exp(x)
+def car_column(vehicle: Vehicle, dt: float) -> Column:
+    """The torque of a car's tyres less its assist, from angle and speed, by the map that `codriver identify alignment` found.
+
+    Args:
+        vehicle: with alignment_gain; alignment_torque_sd is the map's error, N m, friction and all.
+        dt: tick, s.
+    """
+    model = AlignmentModel.from_vehicle(vehicle)
+    error = vehicle.number("alignment_torque_sd") if "alignment_torque_sd" in vehicle else 0.0
+
+    def at(carry: Scalars, u: Scalars, ok: Scalars, angle: Scalar, moved: Scalar) -> Moment:
+        torque, states, there = _mapped(model, carry, u, ok, angle, dt)
+        return Moment(torque - model.coulomb * states["map_presliding"], error**2, there, states)
+
+    return Column(
+        ("longitudinal_speed",), _map_carry(model), at, {"known_torque": "map of angle and speed"}, error=error
+    )
+
+
+def single_track_column(vehicle: Vehicle, dt: float) -> Column:
+    """The tyres' torque by eq. (92), sideslip and yaw rate by a single track, from angle and speed.
+
+    Args:
+        vehicle: with alignment_stiffness and the parameters of `SingleTrack`; alignment_torque_sd is its error, N m.
+        dt: tick, s.
+    """
+    model, rubbing = AlignmentModel.eq_92(vehicle), friction_of(vehicle, dt)
+    error = vehicle.number("alignment_torque_sd") if "alignment_torque_sd" in vehicle else 0.0
+
+    def at(carry: Scalars, u: Scalars, ok: Scalars, angle: Scalar, moved: Scalar) -> Moment:
+        torque, states, there = _mapped(model, carry, u, ok, angle, dt)
+        z, against, spread = rubbing.at(carry["bristle"], moved)
+        return Moment(torque - against, error**2 + spread, there, {**states, "bristle": z})
+
+    settings = {"known_torque": "eq. (92), single track", **rubbing.settings}
+    return Column(("longitudinal_speed",), {**_map_carry(model), "bristle": 0.0}, at, settings, error=error)
+
+
+def _map_carry(model: AlignmentModel) -> dict[str, float]:
+    """The carried scalars of a map."""
+    return {f"map_{name}": value for name, value in model.states.items()}
+
+
+def _mapped(
+    model: AlignmentModel, carry: Scalars, u: Scalars, ok: Scalars, angle: Scalar, dt: float
+) -> tuple[Scalar, Scalars, Scalar]:
+    """Torque of a map, its new carry, and whether the speed is there; without speed it stays as it was."""
+    there = ok["longitudinal_speed"]
+    speed = select(there, u["longitudinal_speed"], 0.0)
+    before = {name: carry[f"map_{name}"] for name in model.states}
+    states = model.advance(before, angle, speed, dt)
+    memory = {f"map_{name}": select(there, states[name], before[name]) for name in model.states}
+    return model.torque(states, angle, speed), memory, there

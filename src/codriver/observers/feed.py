@@ -10,6 +10,7 @@ from codriver.observers.registry import ESTIMATORS, families, needed_signals
 from codriver.signals import Log
 from codriver.vehicles import Vehicle
 
+MANY = 3  # parameters of a vehicle that are named one by one
 NICE_RATES = (20.0, 25.0, 50.0, 100.0, 200.0)
 
 
@@ -39,6 +40,8 @@ class Feed:
     def lacks(self, vehicle: Vehicle | None) -> str:
         """What stands in its way, for people."""
         wants = [f"[{p}] of the vehicle" for p in self.lacking] if vehicle is not None else []
+        if len(wants) > MANY:
+            wants = [*wants[:1], f"{len(wants) - 1} more parameters of it"]
         return ", ".join([*self.missing, *wants, *(["a vehicle"] if self.lacking and vehicle is None else [])])
 
 

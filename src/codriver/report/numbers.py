@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from codriver.estimate import Estimate
+from codriver.measured_torque import compare_with_sensor
 from codriver.report.panels import SIGMAS, on_ticks
 from codriver.report.shown import clock, number, shown, shown_unit, words
 from codriver.signals import Log
@@ -15,8 +16,13 @@ from codriver.summary import Summary
 
 ACCELERATIONS = ("intentional_acceleration", "longitudinal_acceleration")
 JERKS = ("intentional_jerk", "longitudinal_jerk")
-LESS = ("longitudinal_speed", "acceleration_offset")  # their figures say little of the driver
-SHARED = {"both_pedals": "both pedals pressed", "standstill": "standing still"}
+LESS = (
+    "longitudinal_speed",
+    "acceleration_offset",
+    "steering_wheel_angle",
+    "steering_wheel_rate",
+)  # their figures say little of the driver
+SHARED = {"both_pedals": "both pedals pressed", "standstill": "standing still", "hands_on": "hands on the wheel"}
 LONGEST_LAG = 2.0  # s
 
 
@@ -58,7 +64,21 @@ def figures(estimate: Estimate, told: Summary) -> list[Row]:
     if told.gear_shifts is not None:
         rows.append(Row("gear shifts", str(told.gear_shifts)))
     for flag, share in told.shares.items():
-        rows.append(Row(SHARED.get(flag, words(flag)), f"{share:.1%}", "share of the duration"))
+        note = (
+            "share of the valid time in which it is likelier than not"
+            if flag == "hands_on"
+            else "share of the duration"
+        )
+        rows.append(Row(SHARED.get(flag, words(flag)), f"{share:.1%}", note))
+    sensor = compare_with_sensor(estimate)
+    if sensor is not None:
+        name = words(sensor.sensor)
+        rows.append(
+            Row(f"against the measured {name}, RMSE", f"{number(sensor.rmse)} N m", "where the estimate is valid")
+        )
+        rows.append(Row(f"against the measured {name}, R²", number(sensor.r2), "1 is perfect; 0 is answering the mean"))
+        if sensor.covered is not None:
+            rows.append(Row(f"measured {name} inside the 95% band", f"{sensor.covered:.0%}"))
     return rows
 
 

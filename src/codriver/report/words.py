@@ -12,6 +12,8 @@ def subject(estimate: Estimate) -> str:
     """What the report is about, for its title."""
     if any(name.startswith("intentional_") for name in estimate):
         return "Driver intention"
+    if "driver_torque" in estimate:
+        return "Driver's steering torque"
     if any(name in estimate for name in ("longitudinal_acceleration", "longitudinal_jerk")):
         return "Vehicle acceleration and jerk"
     names = [words(output.name) for output in estimate.estimates]
@@ -43,6 +45,17 @@ def how_to_read(estimate: Estimate) -> list[str]:
             "taken out. They hold what the driver did, but also gear shifts, the brake's release at a stop and "
             "bumps: without pedals or torque these cannot be told apart."
         )
+    if "driver_torque" in estimate:
+        said.append(
+            "The driver's torque is what turns the wheel beside all that is known to act on the column: angle and rate tell how "
+            "the wheel moved, inertia and damping what torque that took, and the tyres' or motor's torque less friction is "
+            "taken off. A wheel that rests hides up to its friction: the band is wider there."
+        )
+    if "hands_on" in estimate:
+        said.append(
+            "The probability that hands are on the wheel weighs how the torque differs from none against how long hands usually "
+            "stay on or off. Hands that rest without a torque cannot be told from none; the probability then stays in between."
+        )
     lag = expected_lag(estimate)
     if lag is not None and estimate.measured:
         said.append(
@@ -62,7 +75,11 @@ def how_to_read(estimate: Estimate) -> list[str]:
     if any(o.role == "sd" and o.name in estimate for o in estimate.outputs):
         said.append(
             "The band holds the true value 95% of the time if the model and the vehicle's parameters are right. "
-            "It covers the sensors' noise, not a wrong mass or a wrong coefficient."
+            + (
+                "It covers the encoder's noise, friction, and the standard deviations in the vehicle file, but no wrong file."
+                if "driver_torque" in estimate
+                else "It covers the sensors' noise, not a wrong mass or a wrong coefficient."
+            )
         )
     if "acceleration_offset" in estimate:
         said.append(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from codriver.errors import LogError, UsageError
@@ -15,19 +15,20 @@ from codriver.errors import LogError, UsageError
 _OWN = ("car.dbc", "drive.blf", "truth.parquet")  # a folder with these was written here
 
 
-def refuse_foreign(folder: Path, what: str) -> None:
+def refuse_foreign(folder: Path, what: str, own: Sequence[str] = _OWN) -> None:
     """A simulation replaces files only where an earlier one wrote them.
 
     Args:
         folder: to write into.
         what: is written, for people ("demo").
+        own: a folder with these files was written by an earlier one.
 
     Raises:
         UsageError: the folder is a file, or holds files and no simulation.
     """
     if folder.exists() and not folder.is_dir():
         raise UsageError(f"--out {folder} is a file", "a folder, or a name that is free", "choose another --out")
-    if folder.is_dir() and any(folder.iterdir()) and not all((folder / name).is_file() for name in _OWN):
+    if folder.is_dir() and any(folder.iterdir()) and not all((folder / name).is_file() for name in own):
         raise UsageError(
             f"--out {folder} holds files that are no {what}",
             f"a folder that is new, empty or an earlier {what}'s",
@@ -35,19 +36,20 @@ def refuse_foreign(folder: Path, what: str) -> None:
         )
 
 
-def write_folder(folder: Path, write: Callable[[Path], None], what: str) -> None:
+def write_folder(folder: Path, write: Callable[[Path], None], what: str, own: Sequence[str] = _OWN) -> None:
     """Let `write` fill a temporary folder, then move its files into `folder`, made if need be.
 
     Args:
         folder: to write into.
         write: writes all files into the folder it is given.
         what: is written, for people ("demo").
+        own: as for `refuse_foreign`.
 
     Raises:
         UsageError: the folder is a file, or holds files and no simulation.
         LogError: a file cannot be written; the folder is as it was.
     """
-    refuse_foreign(folder, what)
+    refuse_foreign(folder, what, own)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".codriver-") as scratch:

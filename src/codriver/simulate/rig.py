@@ -27,8 +27,8 @@ from codriver.simulate.steering import Wheel
 SUBSTEPS = 4  # a tick
 # Length of straight before, length of the bend (m), angle turned (degrees, left positive).
 _CIRCUIT = (
-    (80, 60, 90), (50, 45, 60), (120, 70, -75), (30, 50, 80), (60, 40, -55), (20, 40, 95), (150, 90, 100), (40, 50, -60),
-    (60, 55, 85), (90, 60, 40),
+    (80, 110, 90), (50, 80, 60), (120, 120, -75), (30, 90, 80), (60, 80, -55), (20, 95, 95), (150, 160, 100), (40, 90, -60),
+    (60, 100, 85), (90, 110, 40),
 )  # fmt: skip
 
 
@@ -194,13 +194,16 @@ def simulate_rig(setting: RigSetting | None = None, *, seed: int = 0) -> RigDriv
     back = car.alignment / car.ratio
     kept = np.zeros((7, n))
     delta = omega = beta = r = psi = y = hand = want = 0.0
-    next_step, along = 0.0, 0.0
+    next_step = 0.0
     ahead = circuit_curvature(car.speed * (time + driver.preview))
     here = circuit_curvature(car.speed * time)
     for k in range(n):
         if time[k] >= next_step:
             seen = ahead[k] / bend
-            want = car.ratio * (seen - driver.offset_gain * (y + 0.7 * car.speed * psi) - driver.heading_gain * psi) + wander[k]
+            want = (
+                car.ratio * (seen - driver.offset_gain * (y + 0.7 * car.speed * psi) - driver.heading_gain * psi)
+                + wander[k]
+            )
             next_step = time[k] + driver.step * rng.uniform(0.6, 1.4)
         aligned = back * (beta + car.front * r / car.speed - delta / car.ratio)
         # The arms bear what the tyres will ask for at the wanted angle, and pull the rest of the way.
@@ -215,7 +218,6 @@ def simulate_rig(setting: RigSetting | None = None, *, seed: int = 0) -> RigDriv
             beta, r = beta + dt * change[0], r + dt * change[1]
             psi += dt * (r - car.speed * here[k])
             y += dt * car.speed * (psi + beta)
-        along += s.dt * car.speed
     measured = np.round(kept[0] / s.resolution) * s.resolution if s.resolution > 0 else kept[0]
     return RigDrive(s, time, measured, kept[0], kept[1], kept[2], kept[3], kept[4], kept[5], here, kept[6])
 

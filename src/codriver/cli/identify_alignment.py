@@ -1,0 +1,67 @@
+"""codriver identify alignment: what a car's road does to its steering column, from drives with a measured torque."""
+
+from __future__ import annotations
+
+import json as json_module
+from typing import Any
+
+import typer
+
+from codriver.cli.identify import Logs, Out, Overwrite, Report, _check_outputs, _finite
+from codriver.cli.identify_steering import Old, _say, _write, app
+from codriver.cli.options import Bus, Dbc, Json, Names
+
+
+@app.command("alignment")
+def alignment(
+    logs: Logs, out: Out, dbc: Dbc = None, names: Names = None, bus: Bus = None, vehicle: Old = None, report: Report = None,
+    overwrite: Overwrite = False, json: Json = False,
+) -> None:  # fmt: skip
+    """The torque of tyres, road and friction on the column, by angle and speed, from drives with a torque sensor (2019, eq. 92).
+
+    Example: codriver identify alignment mountain.csv motorway.csv --names names.toml -o car.toml --report car.html
+    """
+    from codriver.cli.options import check_inputs
+    from codriver.cli.terminal import command_line, working
+    from codriver.identify import identify_alignment
+    from codriver.logs import read
+    from codriver.report.alignment import alignment_document, alignment_rows
+    from codriver.vehicles import load_vehicle
+
+    for path in logs:
+        check_inputs(path, dbc, names)
+    _check_outputs(out, report, [*logs, *(p for p in (dbc, names) if p is not None)], overwrite)
+    old = load_vehicle(vehicle) if vehicle is not None else None
+    with working(not json, 2) as stage:
+        stage("reading " + ", ".join(path.name for path in logs))
+        recorded = [read(path, dbc=dbc, names=names, bus=bus) for path in logs]
+        stage("identifying")
+        fit = identify_alignment(recorded, old)
+    _write(fit.vehicle(old, out.stem), alignment_document(fit, old, command_line()), out, report, overwrite)
+    held = [] if fit.held.whole is None else [*fit.held.parts, fit.held.whole]
+    told: dict[str, Any] = {
+        "logs": [str(path) for path in logs],
+        "coefficients": {
+            c.name: {"value": c.value, "sd": c.sd, "low": c.low, "high": c.high, "unit": c.unit}
+            for c in fit.coefficients.values()
+        },
+        "refused": {r.name: r.reason for r in fit.refused},
+        "minutes": fit.minutes, "rmse_Nm": fit.rmse, "r2": fit.r2, "lead_s": fit.lead,
+        "left_out": "drives" if fit.held.by_drive else "blocks",
+        "held_out": {h.name: {"seconds": h.seconds, "rmse_Nm": h.rmse, "r2": h.r2} for h in held},
+        "correlation_time_s": fit.held.time,
+        "findings": [{"severity": f.severity, "text": f.text} for f in fit.findings],
+        "result": str(out), "report": str(report) if report is not None else None,
+    }  # fmt: skip
+    if json:
+        typer.echo(json_module.dumps(_finite(told), indent=2, ensure_ascii=False, allow_nan=False))
+        return
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for column in (f"left out ({told['left_out']})", "s", "map: RMSE, R2", "regression", "mean"):
+        table.add_column(column, justify="left" if column.startswith("left") else "right")
+    for h in held:
+        table.add_row(h.name, f"{h.seconds:.0f}", *(f"{h.rmse[way]:.3f}, {h.r2[way]:.2f}" for way in h.rmse))
+    head = f"{', '.join(path.name for path in logs)}: {fit.minutes:.1f} min, RMSE {fit.rmse:.3f} N m, R2 {fit.r2:.3f}"
+    _say(head, alignment_rows(fit, old), told, table if held else None)
