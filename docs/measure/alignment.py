@@ -103,6 +103,12 @@ def moving(drive: Drive) -> Drive:
     return replace(drive, lateral=force)
 
 
+def earlier(drive: Drive) -> Drive:
+    """The angle 40 ms earlier, as no causal estimate has it."""
+    names = ("angle", "rate", "lateral", "road_curvature")
+    return replace(drive, **{n: np.interp(drive.time + 0.04, drive.time, getattr(drive, n)) for n in names})
+
+
 def told(y: Array, x: Array) -> str:
     """RMSE and R2."""
     e = y - x
@@ -155,6 +161,7 @@ def main(folder: Path) -> None:
         "map, roads made for the speed of the moment": at_the_moment,
         "map, all roads made for one speed": all_alike,
         "map, slip of a moving single track": moving,
+        "map, angle 40 ms earlier": earlier,
     }
     for name, changed in others.items():
         new = {n: changed(d) for n, d in drives.items()}
