@@ -91,7 +91,7 @@ class TestFilter:
     def test_against_the_pi_observer_and_the_quasistatic_answer(self, drive_name, best, paper, request):
         """The paper's V_33 and others in decades, and T_dr = -T_aln.
 
-        Without friction a PI observer whose V_33 was chosen by the truth is as good; with friction, which it does not know, none is.
+        Without friction a PI observer whose V_33 was chosen by the truth is as good; with friction, unknown to it, none is.
         """
         from codriver.observers.pi_weights import PIWeights
 
