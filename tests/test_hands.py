@@ -269,7 +269,7 @@ class TestSimulatedDrives:
         known = [program.run(other.log(k)).columns for k in range(4)]
         columns = [np.array([c[name] for c in known]) for name in NAMES]
         off = (other.state == OFF) & (columns[2] > 0)
-        fitting = replace(HandsSettings().floored(columns[0][off], columns[1][off]), correlation=0.1)
+        fitting = HandsSettings().floored(columns[0][off], columns[1][off])
         seen = [program.run(drives.log(k)).columns for k in range(4)]
         plain, mended = (
             judge_hands(
