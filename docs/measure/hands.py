@@ -57,11 +57,8 @@ def estimated(seed: int, drives: int, walk: float, setting: HandsSetting | None 
     """Simulate and estimate the torque."""
     setting = setting or HandsSetting()
     made, car = simulate_hands(setting, drives=drives, seed=seed), setting.vehicle()
-    program = cd.compile(
-        driver_torque_observer(
-            car, logged_column(car), TorqueNoise(order=1, angle=5e-4, slip=0.0, rate=0.0, torque=walk), DT
-        )
-    )
+    noise = TorqueNoise(order=1, angle=5e-4, slip=0.0, rate=0.0, torque=walk)
+    program = cd.compile(driver_torque_observer(car, logged_column(car, DT), noise, DT))
     runs = [program.run(made.log(drive)).columns for drive in range(drives)]
     columns = (np.array([run[name] for run in runs]) for name in ("driver_torque", "driver_torque_sd", "valid"))
     return Estimated(*columns, made.hands_on)
