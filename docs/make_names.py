@@ -85,7 +85,8 @@ def _every_parameter() -> Vehicle:
     car = cd.load_vehicle("bisoffi2017")
     track = {
         "yaw_inertia": 2600.0, "front_axle_distance": 1.2, "front_cornering_stiffness": 9e4, "rear_cornering_stiffness": 1.1e5,
-        "alignment_stiffness": 1000.0, "alignment_whole": 1.0, "steering_inertia": 0.03, "torque_scale": 1.9, "steering_end_stop": 8.0,
+        "alignment_stiffness": 1000.0, "alignment_whole": 1.0, "steering_inertia": 0.03, "torque_scale": 1.9,
+        "steering_end_stop": 8.0,
     }  # fmt: skip
     for name, value in {**USUAL, **track}.items():
         car = car.with_parameter(name, value, 0.05 * value)

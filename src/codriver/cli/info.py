@@ -135,7 +135,8 @@ def _show_family(family: str, members: list[dict[str, Any]], summary: dict[str, 
     from codriver.cli.terminal import console
 
     out = console()
-    others = any(e["signals_there"] for e in summary["estimators"])
+    # Where nothing is mapped yet, the first family is told in full.
+    others = any(e["signals_there"] for e in summary["estimators"]) or family != summary["estimators"][0]["family"]
     if others and not any(e["signals_there"] for e in members):
         least = next(e for e in members if e["name"] == summary["least_demanding"][family])
         out.print(

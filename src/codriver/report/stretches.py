@@ -82,7 +82,8 @@ def not_valid(estimate: Estimate) -> list[Stretch]:
     if "longitudinal_speed" in estimate:
         slow = np.abs(estimate.columns["longitudinal_speed"]) < 1.0
     slow &= ~standing
-    rest = ~(unknown | standing | slow)
+    stopped = estimate.flag("at_end_stop")
+    rest = ~(unknown | standing | slow | stopped)
     stretches = []
     for run in _runs(~estimate.valid):
         (start, stop), inside = _span(run, estimate), slice(*run)
@@ -96,6 +97,8 @@ def not_valid(estimate: Estimate) -> list[Stretch]:
             reasons.append(f"{' and '.join(missing)} missing")
         elif unknown[inside].mean() > 0.02:
             reasons.append("inputs unknown (no value yet, or no gear engaged)")
+        if stopped[inside].mean() > 0.02:
+            reasons.append("the wheel is at its end stop")
         if rest[inside].mean() > 0.02 and not missing:
             reasons.append("the estimate has not settled yet")
         stretches.append(Stretch((start, stop), ", ".join(reasons) or "not valid"))

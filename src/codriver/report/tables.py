@@ -72,7 +72,8 @@ def _distrust(estimate: Estimate, origin: float) -> str:
         by_reason.setdefault(stretch.reason, []).append(stretch.span)
     for reason, spans in by_reason.items():
         total = sum(stop - start for start, stop in spans)
-        items.append(f"<li>Leave out {_listed(spans, origin)} ({total:.1f} s in all): not valid, {text(reason)}.</li>")
+        so_much = f"{total:.1f}" if total >= 1 else f"{total:.1g}"
+        items.append(f"<li>Leave out {_listed(spans, origin)} ({so_much} s in all): not valid, {text(reason)}.</li>")
     for name, holes in gaps(estimate).items():
         then = (
             "the estimate goes on without it, and where it is still valid its band is wider"
