@@ -156,6 +156,31 @@ class TestAlignmentModel:
             assert np.isfinite(whole).all()
             assert whole == pytest.approx(plain, rel=1e-12, abs=1e-13)
 
+    def test_compiled_says_the_same_bits(self):
+        """The map inside an observer's step: machine code against plain floats."""
+        from codriver.observers import Observer, Output
+
+        def step(carry, u, y, ok, rho):
+            new = MAP.advance(carry, u["steering_wheel_angle"], u["longitudinal_speed"], 0.02)
+            torque = MAP.torque(new, u["steering_wheel_angle"], u["longitudinal_speed"])
+            return new, {"alignment_torque": torque, "driver_torque": MAP.friction(new, 0.3) - torque, "valid": 1.0}
+
+        names = ("steering_wheel_angle", "longitudinal_speed")
+        observer = Observer(
+            "map", 0.02, names, (), MAP.states,
+            (Output("alignment_torque", "N*m", "estimate"), Output("driver_torque", "N*m", "estimate")), step,
+        )  # fmt: skip
+        t = np.arange(2000) * 0.02
+        columns = {names[0]: 0.3 * np.sin(0.7 * t) + 0.05 * np.sin(9 * t), names[1]: 15 + 14 * np.sin(0.1 * t)}
+        there = np.ones(t.size, bool)
+        out = cd.compile(observer).run_grid(
+            cd.Grid(t, 0.02, columns, dict.fromkeys(names, there), dict.fromkeys(names, there))
+        )
+        plain, path = along(MAP, columns[names[0]], columns[names[1]], 0.02)
+        assert np.array_equal(out["alignment_torque"], plain)
+        rubbing = np.array([MAP.friction({"presliding": z}, 0.3) for z in path[:, 2]])
+        assert np.array_equal(out["driver_torque"], rubbing - plain)
+
     def test_arrays(self):
         angle, speed = np.linspace(-0.5, 0.5, 7), np.full(7, 18.0)
         states = {"road_curvature": MAP.curvature(angle, speed), "road_speed": speed}

@@ -23,6 +23,7 @@ from codriver.testing import check_observer
 
 DT = 0.01
 NAMES = ("driver_torque", "driver_torque_sd", "valid")
+NOISE = TorqueNoise(order=1, angle=5e-4, slip=0.0, rate=0.0, torque=3.0)
 INDEPENDENT = 1e-6  # s, a correlation time far below the tick: every sample counts in full
 
 
@@ -51,9 +52,7 @@ def forward(s: HandsSettings, z: np.ndarray, band: np.ndarray, valid: np.ndarray
 
 def chained(setting: HandsSetting, walk: float = 3.0) -> Observer:
     car = setting.vehicle()
-    first = driver_torque_observer(
-        car, logged_column(car), TorqueNoise(order=1, angle=5e-4, slip=0.0, rate=0.0, torque=walk), DT
-    )
+    first = driver_torque_observer(car, logged_column(car, DT), replace(NOISE, torque=walk), DT)
     return cd.chain(first, hands_observer(DT), "driver-torque-hands")
 
 
@@ -111,8 +110,20 @@ class TestFilter:
         assert 0.999 < p[-1] <= 1
         assert np.isfinite(p).all()
 
-    def test_behind_the_torque_observer(self):
-        check_observer(chained(HandsSetting()))
+    def test_behind_the_torque_observer(self, tmp_path):
+        setting = HandsSetting(seconds=20.0)
+        check_observer(chained(setting))
+        result = cd.compile(chained(setting)).run(simulate_hands(setting).log())
+        cd.write_report(result, tmp_path / "report.html")
+        assert "hands_on" in (tmp_path / "report.html").read_text()
+
+    def test_floor_of_a_stretch_without_hands(self):
+        rng = np.random.default_rng(2)
+        band = rng.uniform(0.2, 0.4, 100_000)
+        s = HandsSettings(share=0.5, floor=0.1)
+        z = np.sqrt((0.5 * band) ** 2 + 0.3**2) * rng.standard_normal(band.size)
+        assert s.floored(z, band).floor == pytest.approx(0.3, rel=0.01)
+        assert s.floored(0 * z, band).floor == pytest.approx(0.01)
 
     @pytest.mark.parametrize(
         "wrong",
@@ -247,3 +258,24 @@ class TestSimulatedDrives:
         assert judged.calibration_error < 0.1
         assert judged.log_loss < 0.75 * share.log_loss
         assert judged.brier < 0.7 * share.brier
+
+    def test_errors_of_the_model_want_a_floor(self):
+        """With friction that the torque observer knows dimly, the defaults are too sure; a stretch without hands mends most."""
+        base = HandsSetting()
+        setting = replace(base, wheel=replace(base.wheel, friction=0.4))
+        car = setting.vehicle()
+        observer = driver_torque_observer(car, logged_column(car, DT), NOISE, DT)
+        program, drives, other = cd.compile(observer), *(simulate_hands(setting, drives=4, seed=k) for k in (910, 911))
+        known = [program.run(other.log(k)).columns for k in range(4)]
+        columns = [np.array([c[name] for c in known]) for name in NAMES]
+        off = (other.state == OFF) & (columns[2] > 0)
+        fitting = HandsSettings().floored(columns[0][off], columns[1][off])
+        seen = [program.run(drives.log(k)).columns for k in range(4)]
+        plain, mended = (
+            judge_hands(
+                np.array([run(hands_observer(DT, s), *(c[name] for name in NAMES)) for c in seen]), drives.hands_on, DT
+            )
+            for s in (HandsSettings(), fitting)
+        )
+        assert mended.log_loss < 0.55 < 0.6 < plain.log_loss
+        assert mended.calibration_error < 0.1

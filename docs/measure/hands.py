@@ -57,11 +57,8 @@ def estimated(seed: int, drives: int, walk: float, setting: HandsSetting | None 
     """Simulate and estimate the torque."""
     setting = setting or HandsSetting()
     made, car = simulate_hands(setting, drives=drives, seed=seed), setting.vehicle()
-    program = cd.compile(
-        driver_torque_observer(
-            car, logged_column(car), TorqueNoise(order=1, angle=5e-4, slip=0.0, rate=0.0, torque=walk), DT
-        )
-    )
+    noise = TorqueNoise(order=1, angle=5e-4, slip=0.0, rate=0.0, torque=walk)
+    program = cd.compile(driver_torque_observer(car, logged_column(car, DT), noise, DT))
     runs = [program.run(made.log(drive)).columns for drive in range(drives)]
     columns = (np.array([run[name] for run in runs]) for name in ("driver_torque", "driver_torque_sd", "valid"))
     return Estimated(*columns, made.hands_on)
@@ -109,6 +106,8 @@ def baselines(walk: float) -> dict[str, Callable[[Estimated], np.ndarray]]:
 
     def by_threshold(limit: float) -> Callable[[Estimated], np.ndarray]:
         beyond = abs(known.torque) > limit
+        if beyond.all() or not beyond.any():
+            return lambda e: np.full(e.on.shape, known.on.mean())
         high, low = known.on[beyond].mean(), known.on[~beyond].mean()
         return lambda e: np.where(abs(e.torque) > limit, high, low)
 
@@ -182,7 +181,17 @@ def main(drives: int) -> None:
     for name, setting in others.items():
         seen = estimated(600, drives, WALKS[1], setting)
         share = loss(np.full(seen.on.shape, seen.on.mean()), seen.on)
-        rows.append([*row(name, judge_hands(seen.hands(HandsSettings()), seen.on, DT)), f"{share:.3f}"])
+        ways = {name: HandsSettings()}
+        if name == "hands mostly resting":
+            ways["the same, quiet_dwell 12 s"] = HandsSettings(quiet_dwell=12.0)
+        if name.startswith(("tyre", "friction")):
+            known = estimated(700, 4, WALKS[1], setting)
+            off = (known.on == 0) & (known.valid > 0)
+            fitting = HandsSettings().floored(known.torque[off], known.band[off])
+            ways[f"the same, floor {fitting.floor:.2f} N m from other drives' hands off"] = fitting
+            ways["and correlation 0.1 s"] = replace(fitting, correlation=0.1)
+        for way, settings in ways.items():
+            rows.append([*row(way, judge_hands(seen.hands(settings), seen.on, DT)), f"{share:.3f}"])
     print("\n" + table(["drive", *head[1:], "log loss of the share"], rows))
 
 

@@ -12,7 +12,7 @@ parts from all over the record.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 
@@ -63,41 +63,45 @@ class TorqueFit:
     seconds: float
 
 
-def fit_torque_noise(name: str, log: Log, vehicle: Vehicle, rate: float, label: str = "fitted") -> TorqueFit:
+def fit_torque_noise(
+    name: str, logs: Log | Sequence[Log], vehicle: Vehicle, rate: float, label: str = "fitted"
+) -> TorqueFit:
     """Fit the noise of an estimator of the family driver-torque.
 
     Args:
         name: of the estimator.
-        log: the record; hands may be on or off.
+        logs: one record or several of one wheel; hands may be on or off.
         vehicle: its parameters.
         rate: ticks per second.
         label: name of the noise.
 
     Raises:
-        LogError: too few rows count, or the angle never moves.
+        LogError: too few rows count.
+        MissingSignal: a log lacks a signal.
     """
-    dt = 1.0 / rate
+    dt, several = 1.0 / rate, [logs] if isinstance(logs, Log) else list(logs)
     observer = build(name, vehicle, dt=dt, preset=_CAUTIOUS)
     wanted = ("column_torque", "inputs_known", "angle_turns", "angle_jump", f"{ANGLE}_used")
-    run = compile(observer, wanted).run(log)
-    grid = run.grid
-    rows = _rows(run.columns, grid)
-    J, b = vehicle.number("steering_inertia"), vehicle.number("steering_damping")
-    counted = rows.counted
+    program = compile(observer, wanted)
+    runs = [program.run(log) for log in several]
+    rows = _joined([_rows(run.columns, run.grid, LONGEST / len(runs)) for run in runs])
+    J, b = float(observer.settings["J_s"]), float(observer.settings["b_s"])
+    counted, source = rows.counted, ", ".join(log.source for log in several if log.source) or "a record"
     if counted.sum() < LEAST_ROWS:
         raise LogError(
-            f"{log.source or 'this log'}: {int(counted.sum())} angles with a known torque on the column for {SETTLING:g} s before",
+            f"{source}: {int(counted.sum())} angles with a known torque on the column for {SETTLING:g} s before",
             f"at least {LEAST_ROWS} to fit the noise to", "give a longer record, or a preset (--preset)",
         )  # fmt: skip
-    floor = _step_of(grid.values[ANGLE][grid.fresh[ANGLE]]) ** 2 / 12
+    steps = [_step_of(run.grid.values[ANGLE][run.grid.fresh[ANGLE]]) for run in runs]
+    floor = min(steps) ** 2 / 12
     best: dict[int, tuple[float, TorqueNoise]] = {}
     for order in ORDERS:
         program = _likelihood(J, b, dt, order)
         found = _search(partial(_evidence, program, rows, J, floor))
         value, factor = _evidence(program, rows, J, floor, found)
         angle, slip, rate_noise, torque = (float(np.sqrt(factor * q)) for q in (1.0, *_intensities(found, J)))
-        source = f"maximum likelihood on {log.source or 'a record'}"
-        best[order] = value, TorqueNoise(order, angle, slip, rate_noise, torque, source, label)
+        origin = f"maximum likelihood on {source}"
+        best[order] = value, TorqueNoise(order, angle, slip, rate_noise, torque, origin, label)
     order = max(best, key=lambda o: best[o][0])
     return TorqueFit(best[order][1], {o: value for o, (value, _) in best.items()}, int(counted.sum()), rows.seconds)
 
@@ -111,42 +115,43 @@ class _Rows:
     seconds: float
 
 
-def _rows(columns: Mapping[str, Array], grid: Grid) -> _Rows:
-    """Column torque, unwrapped angle and resets, with the ticks that count."""
-    known, jump = columns["inputs_known"] > 0.5, columns["angle_jump"] > 0.5
-    fresh = grid.fresh[ANGLE]
+def _rows(columns: Mapping[str, Array], grid: Grid, longest: float) -> _Rows:
+    """Column torque, unwrapped angle and resets, with the ticks that count; at most so many seconds of it."""
+    known, jump, fresh = columns["inputs_known"] > 0.5, columns["angle_jump"] > 0.5, grid.fresh[ANGLE]
     angle = np.where(fresh, grid.values[ANGLE] + columns["angle_turns"], 0.0)
-    first = np.zeros(fresh.size, bool)
-    first[: int(np.argmax(fresh)) + 1] = True
+    chosen = _chosen(fresh.size, grid.dt, longest)
+    # Each piece begins anew with its first angle.
+    reset = jump.copy()
+    for start in np.flatnonzero(chosen & ~np.r_[False, chosen[:-1]]):
+        later = np.flatnonzero(fresh[start:])
+        reset[start : start + (int(later[0]) if later.size else fresh.size) + 1] = True
     settled = max(round(SETTLING / grid.dt), 1)
-    broken = ~known | jump | first
-    recent = np.convolve(broken, np.ones(settled), "full")[: broken.size] > 0.5
-    chosen = _chosen(fresh.size, grid.dt)
-    counted = (columns[f"{ANGLE}_used"] > 0.5) & ~recent
-    there = np.ones(fresh.size, bool)
+    recent = np.convolve(~known | reset, np.ones(settled), "full")[: reset.size] > 0.5
+    counted = (columns[f"{ANGLE}_used"] > 0.5) & ~recent & ~reset
     made = {
-        "torque": columns["column_torque"], "angle": angle, "reset": (jump | first).astype(float),
-        "known": known.astype(float), "fresh": fresh.astype(float),
+        "torque": columns["column_torque"], "angle": angle, "reset": reset, "known": known, "fresh": fresh,
     }  # fmt: skip
-    if not chosen.all():
-        # The pieces are joined; each begins anew, and settles before it counts.
-        edge = np.flatnonzero(chosen & ~np.roll(chosen, 1))
-        for start in edge:
-            counted[start : start + settled] = False
-            made["reset"][start : start + 1] = made["fresh"][start : start + 1]
-    cut = {name: np.ascontiguousarray(column[chosen]) for name, column in made.items()}
-    flags = dict.fromkeys(cut, there[chosen])
-    n = int(chosen.sum())
-    return _Rows(
-        Grid(grid.dt * np.arange(n, dtype=np.float64), grid.dt, cut, flags, flags), counted[chosen], n * grid.dt
-    )
+    return _of({name: np.asarray(column[chosen], float) for name, column in made.items()}, counted[chosen], grid.dt)
 
 
-def _chosen(n: int, dt: float) -> Flags:
+def _joined(parts: Sequence[_Rows]) -> _Rows:
+    """Records one after the other."""
+    columns = {name: np.concatenate([part.grid.values[name] for part in parts]) for name in parts[0].grid.values}
+    return _of(columns, np.concatenate([part.counted for part in parts]), parts[0].grid.dt)
+
+
+def _of(columns: dict[str, Array], counted: Flags, dt: float) -> _Rows:
+    """Columns that are all there, as a grid."""
+    n = counted.size
+    there = dict.fromkeys(columns, np.ones(n, bool))
+    return _Rows(Grid(dt * np.arange(n, dtype=np.float64), dt, columns, there, there), counted, n * dt)
+
+
+def _chosen(n: int, dt: float, longest: float) -> Flags:
     """Ticks to look at: all of a short record, equal pieces from all over a long one."""
-    if n * dt <= LONGEST:
+    if n * dt <= longest:
         return np.ones(n, bool)
-    pieces, length = round(LONGEST / PIECE), round(PIECE / dt)
+    pieces, length = max(round(longest / PIECE), 1), round(min(PIECE, longest) / dt)
     mask = np.zeros(n, bool)
     for start in np.linspace(0, n - length, pieces).astype(int):
         mask[start : start + length] = True

@@ -177,16 +177,16 @@ def _angle(values: Mapping[str, Array], grid: Grid, log: Log) -> list[Finding]:
 
 
 def _rests_at_its_end(angle: Array, dt: float) -> float:
-    """Seconds for which an angle rests at its extremes, in rests of a second or more, far from where it mostly is."""
+    """Seconds for which an angle rests at its extremes, in rests of half a second or more, away from where it mostly is."""
     if angle.size < FEW or not np.ptp(angle) > 0:
         return 0.0
-    total, middle, usual = 0, float(np.median(angle)), float(np.quantile(np.abs(angle - np.median(angle)), 0.9))
+    total, middle = 0, float(np.median(angle))
     for end in (angle.max(), angle.min()):
-        if abs(end - middle) < 1.2 * usual:
+        if abs(end - middle) < 0.25 * np.ptp(angle):
             continue
         edges = np.flatnonzero(np.diff(np.r_[0, (angle == end).astype(np.int8), 0]))
-        total += sum(int(b - a) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a) * dt >= 1.0)
-    return total * dt
+        total += sum(int(b - a) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a) * dt >= 0.5)
+    return total * dt if total * dt >= 1.0 else 0.0
 
 
 def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid) -> Finding:

@@ -153,6 +153,7 @@ def check_with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> C
     if vehicle is None:
         return check
     from codriver.identify import check_vehicle_against_log
+    from codriver.observers.column import friction_unsaid
     from codriver.observers.gears import unknown_gears
 
     said = {f.text for f in check.findings}
@@ -162,6 +163,7 @@ def check_with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> C
         [
             *(replace(f, text=f"vehicle file: {f.text}") for f in found),
             *(unknown_gears(log, vehicle) if "gear" in result.grid.values else []),
+            *(friction_unsaid(vehicle) if "column_torque" in result else []),
             *check.findings,
         ],
         key=lambda f: order[f.severity],

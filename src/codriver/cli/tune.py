@@ -18,7 +18,8 @@ Tuned = Annotated[
     str,
     typer.Argument(
         metavar="ESTIMATOR",
-        help="intent-pedals, intent-torque, kinematic, or intent: the best the log can feed. Others have no such noise.",
+        help="intent-pedals, intent-torque, kinematic, or intent: the best the log can feed; driver-torque or one of its Kalman "
+        "filters. Others have no such noise.",
         show_default=False,
     ),
 ]
@@ -50,9 +51,12 @@ def tune(
     from codriver.cli.estimate import check_report, check_with_vehicle
     from codriver.cli.options import check_inputs
     from codriver.cli.terminal import command_line, working
+    from codriver.cli.tune_torque import tune_torque
+    from codriver.errors import UsageError
     from codriver.logs import read
     from codriver.observers import find_preset
-    from codriver.run import check_rate
+    from codriver.observers.registry import get_estimator
+    from codriver.run import check_rate, choose
     from codriver.tune import tune as tuned
     from codriver.vehicles import load_vehicle
 
@@ -63,9 +67,22 @@ def tune(
         _check_out(out, inputs, overwrite)
     check_report(report)
     check_rate(rate)
+    car = load_vehicle(vehicle) if vehicle is not None else None
+    if _of_torque(estimator):
+        _refuse_for_torque(
+            {"--delay": delay, "--likelihood": likelihood or None, "--preset": preset, "--report": report}
+        )
+        with working(not json, 2) as stage:
+            stage(f"reading {', '.join(log.name for log in logs)}")
+            recorded = [read(log, dbc=dbc, names=names, bus=bus) for log in logs]
+            stage("tuning")
+            chosen, _ = choose(estimator, recorded[0], car)
+            if not get_estimator(chosen).learns:
+                raise UsageError(f"{chosen} has no noise to tune", "a Kalman filter of driver-torque", "choose another")
+        tune_torque(chosen, recorded, car, rate, out, json)
+        return
     if preset is not None:
         find_preset(preset)
-    car = load_vehicle(vehicle) if vehicle is not None else None
     with working(not json, 3) as stage:
         stage(f"reading {', '.join(log.name for log in logs)}")
         recorded = [read(log, dbc=dbc, names=names, bus=bus) for log in logs]
@@ -81,6 +98,31 @@ def tune(
         typer.echo(json_module.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
     else:
         _say(result, told)
+
+
+def _of_torque(estimator: str) -> bool:
+    """Whether an estimator, or a family, is of the driver's torque."""
+    from codriver.observers.driver_torque_family import FAMILY
+    from codriver.observers.registry import ESTIMATORS
+
+    return estimator == FAMILY or (estimator in ESTIMATORS and ESTIMATORS[estimator].family == FAMILY)
+
+
+def _refuse_for_torque(given: dict[str, Any]) -> None:
+    """Options that the noise of a driver's torque has not.
+
+    Raises:
+        UsageError: one was given.
+    """
+    from codriver.errors import UsageError
+
+    strange = [option for option, value in given.items() if value is not None]
+    if strange:
+        raise UsageError(
+            f"{', '.join(strange)} for a driver's torque",
+            "its noise is found by maximum likelihood alone",
+            "leave it out",
+        )
 
 
 def _write(result: Tuning, out: Path | None, report: Path | None, command: str) -> None:
@@ -114,10 +156,11 @@ def _check_out(out: Path, inputs: list[Path | None], overwrite: bool) -> None:
 
     from codriver.errors import UsageError
     from codriver.observers import PRESETS, find_preset
+    from codriver.observers.torque_noise import TORQUE_NOISES, find_torque_noise
 
     if out.suffix != ".toml" or out.is_dir():
         raise UsageError(f"-o {out}", "the name of a file ending in .toml", "rename it")
-    if out.stem in PRESETS:
+    if out.stem in PRESETS or out.stem in TORQUE_NOISES:
         raise UsageError(f"-o {out}: '{out.stem}' is the name of a paper's preset", "a name of your own", "rename it")
     if not out.parent.is_dir() or not os.access(out.parent, os.W_OK):
         raise UsageError(
@@ -129,10 +172,13 @@ def _check_out(out: Path, inputs: list[Path | None], overwrite: bool) -> None:
         raise UsageError(f"-o {out} is an input", "another name", "choose another -o; inputs are kept")
     if not overwrite:
         raise UsageError(f"-o {out} is there already", "the name of a new file", "choose another, or say --overwrite")
-    try:
-        find_preset(out)
-    except UsageError:
-        raise UsageError(f"-o {out} is there already and no preset", "a new name", "choose another -o") from None
+    for read in (find_preset, find_torque_noise):
+        try:
+            read(out)
+        except UsageError:
+            continue
+        return
+    raise UsageError(f"-o {out} is there already and no preset", "a new name", "choose another -o")
 
 
 def told_of(result: Tuning, out: Path | None, report: Path | None) -> dict[str, Any]:

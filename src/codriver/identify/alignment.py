@@ -5,8 +5,8 @@
 Drives that tell a coefficient have curves (k_a, T_s), at several speeds (the bank, e_max and q: a curve taken faster and slower
 than it is made for), and small corrections (T_c, w, b_s). What they do not tell is refused and held at a usual car's value.
 
-A constant error of the angle's zero looks like T_0 at any one speed and is not fitted: on real roads it followed the bank of the
-road, and made held-out drives worse.
+A constant error of the angle's zero looks like T_0 at any one speed and is not fitted: on drives left out it did harm as often as
+good (alignment.md).
 """
 
 from __future__ import annotations

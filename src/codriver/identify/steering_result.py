@@ -135,6 +135,12 @@ class SteeringFit:
             if letter in self.coefficients:
                 found = self.coefficients[letter]
                 new = new.with_parameter(parameter, found.value, found.sd, text)
+        refused = {r.name for r in self.refused}
+        if "J_s" in self.coefficients and "T_c" not in self.coefficients and "T_c" not in refused:
+            new = new.with_parameter("steering_friction", 0.0, source=f"{self.source} asks for none")
+        if self.end_stops:
+            where = f"the wheel is stopped there in {self.source}"
+            new = new.with_parameter("steering_end_stop", min(abs(stop) for stop in self.end_stops), source=where)
         return new
 
 

@@ -50,7 +50,8 @@ STATES = ("started", "last_angle", "presliding", "road_curvature", "road_speed",
 # What a passenger car has where nobody measured it: name in a vehicle file, value (SI).
 USUAL = {
     "steering_ratio": 15.0, "wheelbase": 2.8, "characteristic_speed": 28.0, "alignment_gain": 1.0, "alignment_bend": 1.5,
-    "alignment_offset": 0.0, "road_bank": 0.04, "road_bank_share": 0.5, "steering_damping": 0.5, "steering_friction": 0.2,
+    "alignment_offset": 0.0, "road_bank": 0.04, "road_bank_share": 0.5, "steering_inertia": 0.04, "steering_damping": 0.5,
+    "steering_friction": 0.2,
     "steering_friction_width": 0.004,
 }  # fmt: skip
 

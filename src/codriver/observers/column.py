@@ -15,8 +15,8 @@ an encoder's last digit does:
 
 A wheel that sticks can hold any torque up to T_c, and what it holds soon has nothing to do with how it came to rest: so z
 fades, and the variance of T_f is T_c^2 (1 - z^2) / 3 + (sd of T_c)^2 z^2, that of a uniform torque where z = 0. REST is from
-simulated drivers: docs/driver-torque.md. A car's map has its own friction, and its error is known as a whole, from drives it
-was not fitted to.
+simulated drivers: docs/driver-torque.md. Errors of torque_scale and torque_offset are in the variance, too. A car's map has its
+own friction, and its error is known as a whole, from drives it was not fitted to.
 Dahl 1968 (Aerospace Corporation, TOR-0158(3107-18)-1).
 """
 
@@ -26,6 +26,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import exp, pi
 
+from codriver.finding import Finding
 from codriver.kernel import Scalar, select
 from codriver.models.alignment import AlignmentModel
 from codriver.observers.observer import Scalars
@@ -83,19 +84,28 @@ def logged_column(vehicle: Vehicle, dt: float, name: str = "alignment_torque") -
         dt: tick, s.
         name: "alignment_torque", "steering_motor_torque" or "steering_motor_command".
     """
-    scale, offset = 1.0, 0.0
+    scale, offset, sd_scale, sd_offset = 1.0, 0.0, 0.0, 0.0
     if name == "steering_motor_command":
-        scale = vehicle.number("torque_scale")
-        offset = vehicle.number("torque_offset") if "torque_offset" in vehicle else 0.0
+        scale, sd_scale = _with_sd(vehicle, "torque_scale")
+        offset, sd_offset = _with_sd(vehicle, "torque_offset")
     rubbing = friction_of(vehicle, dt)
 
     def at(carry: Scalars, u: Scalars, ok: Scalars, angle: Scalar, moved: Scalar) -> Moment:
         there = ok[name]
-        torque = scale * select(there, u[name], 0.0) + offset
+        value = select(there, u[name], 0.0)
         z, against, variance = rubbing.at(carry["bristle"], moved)
-        return Moment(torque - against, variance, there, {"bristle": z})
+        variance = variance + (sd_scale * value) * (sd_scale * value) + sd_offset**2
+        return Moment(scale * value + offset - against, variance, there, {"bristle": z})
 
     return Column((name,), {"bristle": 0.0}, at, {"known_torque": name, **rubbing.settings})
+
+
+def _with_sd(vehicle: Vehicle, name: str) -> tuple[float, float]:
+    """A parameter and its standard deviation; 0 where there is none."""
+    if name not in vehicle:
+        return 0.0, 0.0
+    sd = vehicle.parameters[name].sd
+    return vehicle.number(name), float(sd) if isinstance(sd, (int, float)) else 0.0
 
 
 @dataclass(frozen=True)
@@ -138,6 +148,16 @@ def friction_of(vehicle: Vehicle, dt: float) -> Friction:
     name = "steering_friction_width"
     width = vehicle.number(name) if name in vehicle else WIDTH
     return Friction(level, sd, width, exp(-dt / REST))
+
+
+def friction_unsaid(vehicle: Vehicle) -> list[Finding]:
+    """A warning where the vehicle file does not say whether the column has friction: it would count as the driver's torque."""
+    if "steering_friction" in vehicle:
+        return []
+    return [Finding(
+        "warn", f"vehicle '{vehicle.name}' has no steering_friction: what friction holds counts as the driver's torque, outside "
+        "the band; codriver identify steering-wheel finds it, 0 says there is none",
+    )]  # fmt: skip
 
 
 def car_column(vehicle: Vehicle, dt: float) -> Column:

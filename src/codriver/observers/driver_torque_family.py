@@ -1,129 +1,92 @@
 """The estimators of the driver's torque on the steering wheel: the family `driver-torque`, in order of preference.
 
-| name                  | what else acts on the column                       | how                          |
-|-----------------------|----------------------------------------------------|------------------------------|
-| driver-torque-logged  | the log's alignment_torque                         | Kalman filter, with bands    |
-| driver-torque-car     | a map of angle and speed, identified from drives   | the same                     |
-| driver-torque-single-track | eq. (92) with a single track, from angle and speed | the same                |
-| driver-torque-motor   | steering_motor_torque: the motor of a simulator    | the same                     |
-| driver-torque-command | the motor's command, by torque_scale               | the same                     |
-| driver-torque-pi      | the log's alignment_torque                         | PI observer of the 2019 paper, no bands |
+| name                       | what else acts on the column                           | how                       |
+|----------------------------|--------------------------------------------------------|---------------------------|
+| driver-torque-logged       | the log's alignment_torque                             | Kalman filter, with bands |
+| driver-torque-car          | a map of angle and speed, identified from drives       | the same                  |
+| driver-torque-single-track | eq. (92) with a single track, from angle and speed     | the same                  |
+| driver-torque-motor        | steering_motor_torque: the motor of a simulator        | the same                  |
+| driver-torque-command      | the motor's command, by torque_scale                   | the same                  |
+| driver-torque-pi           | the log's alignment_torque                             | PI observer, no bands     |
 
-Behind each Kalman filter runs the one that tells whether hands are on the wheel (`hands`); what the map of a car errs by without
-hands is its alignment_torque_sd.
+Where the motor's torque is among what is known, the filter that tells whether hands are on the wheel runs behind (`hands`). Without
+it nobody can tell hands from a motor that steers.
 
 Presets of the Kalman filters are a `TorqueNoise`; without one, a run over a log fits it to that log. Those of the PI observer are
-weights V_1 and V_2, in the paper's degrees. Okamoto, Tsiotras 2019 (Robotics and Autonomous Systems), sections 3 and 4.
+weights V_1 and V_2 (`pi_weights`). Okamoto, Tsiotras 2019 (Robotics and Autonomous Systems), sections 3 and 4.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import pi
-from typing import Any
 
-from codriver.errors import UsageError
-from codriver.models import StateSpace
-from codriver.models.steering import steering_model
-from codriver.names import nearest
+from codriver.models.alignment import USUAL
 from codriver.observers.column import Column, car_column, logged_column, single_track_column
 from codriver.observers.driver_torque import driver_torque_observer
 from codriver.observers.hands import HandsSettings, hands_observer
 from codriver.observers.observer import Observer, chain
 from codriver.observers.pi import pi_observer
-from codriver.observers.pi_design import PIDesign, design_pi_observer
+from codriver.observers.pi_weights import DEGREES, PIWeights, find_pi_weights, wheel_pi_design
 from codriver.observers.registry import Design, Estimator, register
 from codriver.observers.torque_noise import TorqueNoise, find_torque_noise
 from codriver.vehicles import Vehicle
 
 FAMILY = "driver-torque"
-Source = Callable[[Vehicle, float], Column]  # of a vehicle, for a tick
 WHEEL = ("steering_inertia", "steering_damping")
 SINGLE_TRACK = (
     "steering_ratio", "mass", "yaw_inertia", "wheelbase", "front_axle_distance", "front_cornering_stiffness",
     "rear_cornering_stiffness",
 )  # fmt: skip
-DEGREES = 180 / pi
 
 
 @dataclass(frozen=True)
-class PIWeights:
-    """Weights of theorem 1 for the wheel, the angle in degrees, and how inputs run between ticks.
+class Source:
+    """Where the known torque comes from.
 
     Attributes:
-        V_1: diagonal, of angle, rate and torque.
-        V_2: of the angle.
-        inputs: "straight" or "held".
-        source, name: where they come from.
+        name: of the estimator.
+        parameters: that the vehicle must have.
+        signal: that it needs beside the angle.
+        meaning: as `Estimator` has it.
+        column: makes it, of a vehicle for a tick.
+        wheel: the vehicle that the wheel's inertia and damping are taken from.
+        motor: whether the torque of every motor is in it.
     """
 
-    V_1: tuple[float, float, float]
-    V_2: float
-    inputs: str = "straight"
-    source: str = "given"
-    name: str = "own"
+    name: str
+    parameters: tuple[str, ...]
+    signal: str
+    meaning: str
+    column: Callable[[Vehicle, float], Column]
+    wheel: Callable[[Vehicle], Vehicle] = lambda vehicle: vehicle
+    motor: bool = True
 
-    def settings(self) -> dict[str, str]:
-        """For provenance."""
-        return {"preset": self.name, "V_1": " ".join(f"{v:g}" for v in self.V_1), "V_2": f"{self.V_2:g}"}
-
-
-# The simulation's and the simulator's; section 4.1 and 4.2 of the paper, whose steps of Runge and Kutta hold their inputs.
-PI_WEIGHTS = {
-    "okamoto2019": PIWeights((1.0, 1.0, 1e11), 1.0, "held", "2019, section 4.1", "okamoto2019"),
-    "okamoto2019-simulator": PIWeights((1.0, 1.0, 3.1e9), 1.0, "held", "2019, section 4.2", "okamoto2019-simulator"),
-}
-
-
-def find_pi_weights(preset: Any) -> PIWeights:
-    """Weights themselves, or the paper's by name.
-
-    Raises:
-        UsageError: there are no such weights.
-    """
-    if isinstance(preset, PIWeights):
-        return preset
-    if str(preset) not in PI_WEIGHTS:
-        near = nearest(str(preset), PI_WEIGHTS)
-        raise UsageError(
-            f"no preset '{preset}' for the PI observer", f"one of {', '.join(PI_WEIGHTS)}",
-            f"did you mean {near}?" if near else "choose one, or pass PIWeights in Python",
-        )  # fmt: skip
-    return PI_WEIGHTS[str(preset)]
-
-
-def wheel_in_degrees(inertia: float, damping: float) -> StateSpace:
-    """The wheel as the paper has it: y = 180/pi delta_s (29)."""
-    m = steering_model(inertia, damping)
-    return StateSpace(m.A, m.B, DEGREES * m.C, m.D, m.states, m.inputs, m.outputs)
-
-
-def wheel_pi_design(inertia: float, damping: float, weights: PIWeights) -> PIDesign:
-    """Theorem 1 for a wheel.
-
-    Args:
-        inertia: J_s, kg m^2.
-        damping: b_s, N m s/rad.
-        weights: V_1 and V_2.
-    """
-    return design_pi_observer(wheel_in_degrees(inertia, damping), ("driver_torque",), weights.V_1, weights.V_2)
-
-
-def _kalman(name: str, source: Source) -> Callable[[Vehicle | None, Design], Observer]:
-    """How a Kalman filter with this source is built."""
-
-    def build(vehicle: Vehicle | None, design: Design) -> Observer:
+    def build(self, vehicle: Vehicle | None, design: Design) -> Observer:
+        """The Kalman filter with this source, and the hands behind it where they can be told."""
         assert vehicle is not None  # the registry saw to it, for the estimator has parameters
         assert isinstance(design.preset, TorqueNoise)
-        column = source(vehicle, design.dt)
-        torque = driver_torque_observer(vehicle, column, design.preset, design.dt, name)
+        column = self.column(vehicle, design.dt)
+        torque = driver_torque_observer(self.wheel(vehicle), column, design.preset, design.dt, self.name)
+        if not self.motor:
+            return torque
         settings = HandsSettings()
-        return chain(
-            torque, hands_observer(design.dt, replace(settings, floor=max(settings.floor, column.error))), name
-        )
+        hands = hands_observer(design.dt, replace(settings, floor=max(settings.floor, column.error)))
+        return chain(torque, hands, self.name)
 
-    return build
+
+def usual_wheel(vehicle: Vehicle) -> Vehicle:
+    """A car's vehicle with the inertia and damping of a usual steering wheel, where it has none of its own.
+
+    Drives hardly tell the inertia: a car's wheel is turned slowly. The damping was found with the map and its error is in the
+    map's, so it has no standard deviation of its own here.
+    """
+    damping = vehicle.number("steering_damping") if "steering_damping" in vehicle else USUAL["steering_damping"]
+    vehicle = vehicle.with_parameter("steering_damping", damping, source="found with the map, or a usual car's")
+    if "steering_inertia" in vehicle:
+        return vehicle
+    J = USUAL["steering_inertia"]
+    return vehicle.with_parameter("steering_inertia", J, 0.5 * J, source="a usual passenger car's")
 
 
 def _pi(vehicle: Vehicle | None, design: Design) -> Observer:
@@ -134,40 +97,37 @@ def _pi(vehicle: Vehicle | None, design: Design) -> Observer:
     return pi_observer(made, design.dt, scales=[DEGREES], inputs=weights.inputs, settings=settings)
 
 
-def _logged(name: str) -> Source:
-    return lambda vehicle, dt: logged_column(vehicle, dt, name)
-
-
-def _register(name: str, parameters: tuple[str, ...], signal: str, meaning: str, source: Source) -> None:
-    """A Kalman filter of the family."""
+SOURCES = (
+    Source(
+        "driver-torque-logged", WHEEL, "alignment_torque",
+        "the driver's steering torque from the wheel's angle and the log's alignment torque (2019)", logged_column,
+    ),
+    Source(
+        "driver-torque-car", ("alignment_gain",), "longitudinal_speed",
+        "the driver's steering torque from angle, speed and a map of the car identified from drives", car_column, usual_wheel,
+        motor=False,
+    ),
+    Source(
+        "driver-torque-single-track", (*WHEEL, "alignment_stiffness", *SINGLE_TRACK), "longitudinal_speed",
+        "the driver's steering torque from angle, speed and a single track (2019 eq. 92)", single_track_column,
+        motor=False,
+    ),
+    Source(
+        "driver-torque-motor", WHEEL, "steering_motor_torque",
+        "the driver's steering torque from angle and motor torque, where nothing else acts (2019)",
+        lambda vehicle, dt: logged_column(vehicle, dt, "steering_motor_torque"),
+    ),
+    Source(
+        "driver-torque-command", (*WHEEL, "torque_scale"), "steering_motor_command",
+        "the driver's steering torque from angle and motor command, where nothing else acts (2019)",
+        lambda vehicle, dt: logged_column(vehicle, dt, "steering_motor_command"),
+    ),
+)  # fmt: skip
+for _source in SOURCES:
     register(Estimator(
-        name, parameters, ("steering_wheel_angle", signal), meaning, FAMILY, _kalman(name, source), "driver",
-        find=find_torque_noise, tell=lambda noise: noise.settings(), learns=True, forms=("kalman",),
+        _source.name, _source.parameters, ("steering_wheel_angle", _source.signal), _source.meaning, FAMILY, _source.build,
+        "driver", find=find_torque_noise, tell=lambda noise: noise.settings(), learns=True, forms=("kalman",),
     ))  # fmt: skip
-
-
-_register(
-    "driver-torque-logged", WHEEL, "alignment_torque",
-    "the driver's steering torque from the wheel's angle and the log's alignment torque (2019)", _logged("alignment_torque"),
-)  # fmt: skip
-_register(
-    "driver-torque-car", (*WHEEL, "alignment_gain"), "longitudinal_speed",
-    "the driver's steering torque from angle, speed and a map of the car identified from drives", car_column,
-)  # fmt: skip
-_register(
-    "driver-torque-single-track", (*WHEEL, "alignment_stiffness", *SINGLE_TRACK), "longitudinal_speed",
-    "the driver's steering torque from angle, speed and a single track (2019 eq. 92)", single_track_column,
-)  # fmt: skip
-_register(
-    "driver-torque-motor", WHEEL, "steering_motor_torque",
-    "the driver's steering torque from angle and motor torque, where nothing else acts (2019)",
-    _logged("steering_motor_torque"),
-)  # fmt: skip
-_register(
-    "driver-torque-command", (*WHEEL, "torque_scale"), "steering_motor_command",
-    "the driver's steering torque from angle and motor command, where nothing else acts (2019)",
-    _logged("steering_motor_command"),
-)  # fmt: skip
 register(Estimator(
     "driver-torque-pi", WHEEL, ("steering_wheel_angle", "alignment_torque"),
     "the driver's steering torque by the PI observer of the 2019 paper, no bands", FAMILY, _pi, "okamoto2019",

@@ -30,7 +30,7 @@ HMM filter: Rabiner 1989 (Proceedings of the IEEE 77), section III.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import inf, isfinite, tanh
 
 import numpy as np
@@ -72,6 +72,15 @@ class HandsSettings:
     pulling_torque: float = 1.1
     correlation: float = 0.027
     cap: float = 20.0
+
+    def floored(self, torque: Array, band: Array) -> HandsSettings:
+        """These settings with the floor that a stretch without hands shows, and at least a tenth of their own.
+
+        Args:
+            torque, band: estimated torque and its standard deviation of a drive that is known to be without hands, N m.
+        """
+        beyond = float(np.mean(np.square(torque) - np.square(self.share * np.asarray(band))))
+        return replace(self, floor=max(beyond, 0.01 * self.floor**2) ** 0.5)
 
     def rates(self) -> Array:
         """G, 1/s: row i holds the rates from state i to off, quiet, pulling; rows sum to 0."""

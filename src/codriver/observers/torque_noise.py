@@ -76,8 +76,8 @@ class TorqueNoise:
         }  # fmt: skip
 
 
-# Of simulated drivers and an encoder of 0.1 degree: docs/driver-torque.md. A record of one's own gives better ones.
-TORQUE_NOISES = {"driver": TorqueNoise(1, 5e-4, 0.0, 0.0, 8.0, "simulated drivers, encoder of 0.1 degree", "driver")}
+# As simulated drivers and an encoder of 0.1 degree have it: docs/driver-torque.md. A record of one's own gives better ones.
+TORQUE_NOISES = {"driver": TorqueNoise(1, 5e-4, 0.0, 0.0, 0.6, "simulated drivers, encoder of 0.1 degree", "driver")}
 
 
 def find_torque_noise(preset: str | Path | TorqueNoise) -> TorqueNoise:
