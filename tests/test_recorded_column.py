@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from conftest import recording
-from recorded_column import (
+from codriver.papers.steering2019.recorded_column import (
     HANDS_LEAVE,
     Assisted,
     Shaft,

@@ -11,7 +11,7 @@ from codriver.errors import DesignError
 from codriver.models import StateSpace, steering_model
 from codriver.observers.disturbance import disturbance_observer
 from codriver.observers.disturbance_design import design_disturbance_filter
-from codriver.observers.driver_torque_family import PI_WEIGHTS, PIWeights, wheel_in_degrees, wheel_pi_design
+from codriver.observers.pi_weights import PI_WEIGHTS, PIWeights, wheel_in_degrees, wheel_pi_design
 from codriver.observers.pi_design import PIDesign
 from codriver.observers.uio_design import design_unknown_input_observer
 from codriver.observers.unknown_input import with_unknown

@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 
 from codriver.estimate import Estimate
 from codriver.models.steering import tick_of
-from codriver.observers.driver_torque_family import PI_WEIGHTS, wheel_pi_design
+from codriver.observers.pi_weights import PI_WEIGHTS, wheel_pi_design
 from codriver.offline import smooth
 from codriver.papers.item import Item
 from codriver.papers.reproduction import Chapter

@@ -17,7 +17,7 @@ import numpy as np
 import codriver.program as programs
 from codriver.observers.column import logged_column
 from codriver.observers.driver_torque import driver_torque_observer
-from codriver.observers.driver_torque_family import PIWeights, wheel_pi_design
+from codriver.observers.pi_weights import PIWeights, wheel_pi_design
 from codriver.observers.observer import Observer
 from codriver.observers.torque_noise import TorqueNoise
 from codriver.offline.torque_smoother import smooth_torque

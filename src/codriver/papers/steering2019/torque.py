@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import codriver.program as programs
-from codriver.observers.driver_torque_family import DEGREES, PI_WEIGHTS, PIWeights, wheel_pi_design
+from codriver.observers.pi_weights import DEGREES, PI_WEIGHTS, PIWeights, wheel_pi_design
 from codriver.observers.pi import pi_observer
 from codriver.observers.pi_design import PIDesign
 from codriver.papers.item import Item
