@@ -19,7 +19,7 @@ PAPERS: dict[str, tuple[str, str]] = {
     ),
     "steering2019": (
         "codriver.papers.steering2019",
-        "Okamoto, Tsiotras 2019, Robotics and Autonomous Systems 114, doi:10.1016/j.robot.2019.01.002",
+        "Okamoto, Tsiotras 2019, Robotics and Autonomous Systems",
     ),
     "jerk2015": ("codriver.papers.jerk2015", "Bisoffi, Biral, Da Lio, Zaccarian 2015, doi:10.1109/ITSC.2015.301"),
 }

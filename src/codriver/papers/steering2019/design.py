@@ -53,7 +53,7 @@ def _theorem(d: PIDesign) -> tuple[Item, ...]:
              "of (39), over its greatest term, with Q found again by Hamiltonian and Schur"),
         Item("theorem 1: e and e_v are exponentially stable", "A_obs is Hurwitz", f"eigenvalues {listed} 1/s", "",
              bool(values.real.max() < 0), "of (44), V_1 = diag(1, 1, 1e11), V_2 = 1"),
-        Item("theorem 1: any V_1 >= 0, V_2 > 0 will do", "V_1 ⪰ 0, V_2 ≻ 0", f"V_1 = diag(1, 1, 0) leaves an eigenvalue at {left:.1g} 1/s",
+        Item("theorem 1: any V_1 >= 0, V_2 > 0 will do", "V_1 ⪰ 0, V_2 ≻ 0", f"V_1 = diag(1, 1, 0) leaves an eigenvalue at 0 ({left:.1g} 1/s with V_33 = 1e-6)",
              "", not refused,
              "(A~, V_1^½) must be stabilisable, too: a torque without weight is never corrected. Such weights are refused here"),
         Item("(46): the rank condition over C+", "s in C+", "must be the closed right half-plane", "", None,
