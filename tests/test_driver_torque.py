@@ -190,8 +190,8 @@ class TestNoise:
         log = runs.log().with_signals(cd.Signal("alignment_torque", t, tyres, "N*m", "model"))
         car = cd.load_vehicle("okamoto2019")
         fit = fit_torque_noise(NAME, log, car, 100.0)
-        assert fit.noise.order == 2
-        assert fit.log_likelihood[2] - fit.log_likelihood[1] > 20
+        assert (fit.noise.order, fit.noise.balance) == (2, 0)
+        assert fit.log_likelihood[2, 0] - fit.log_likelihood[1, 0] > 20
         assert fit.noise.angle == pytest.approx(0.1 * pi / 180, rel=0.15)
         ours = estimate_log(NAME, log, car)
         one = estimate_log(NAME, log, car, preset=replace(TORQUE_NOISES["driver"], angle=fit.noise.angle, torque=10.0))
@@ -203,7 +203,7 @@ class TestNoise:
     def test_rough_torque_is_a_random_walk(self, plain):
         fit = fit_torque_noise(NAME, plain.log(), vehicle_of(SMOOTH), 100.0)
         assert fit.noise.order == 1
-        assert fit.log_likelihood[1] - fit.log_likelihood[2] > 100
+        assert fit.log_likelihood[1, 0] - fit.log_likelihood[2, 0] > 100
         # The encoder's step of 0.1 degree: no smaller noise than that of rounding.
         assert fit.noise.angle == pytest.approx(0.1 * pi / 180 / np.sqrt(12), rel=0.3)
 
@@ -214,7 +214,7 @@ class TestNoise:
         use = run.time > run.time[0] + 1.0 + 1e-9
         wanted = -0.5 * float(np.sum(np.log(2 * pi * s[use] ** 2) + (e[use] / s[use]) ** 2))
         assert fit.rows == pytest.approx(use.sum(), abs=2)
-        assert fit.log_likelihood[1] == pytest.approx(wanted, rel=2e-3)
+        assert fit.log_likelihood[1, fit.noise.balance] == pytest.approx(wanted, rel=2e-3)
 
     def test_several_records_and_pieces_of_a_long_one(self, plain, monkeypatch):
         """Records joined add their rows; a long one is looked at in pieces, and tells much the same."""
@@ -233,12 +233,13 @@ class TestNoise:
         assert pieces.noise.torque == pytest.approx(one.noise.torque, rel=0.5)
 
     def test_file_is_read_again_and_wrong_ones_are_refused(self, tmp_path):
-        noise = TorqueNoise(2, 5e-4, 1e-6, 1e-3, 7.5, "a test \u2713", "mine")
+        noise = TorqueNoise(2, 5e-4, 1e-6, 1e-3, 7.5, "a test \u2713", "mine", 1)
         save_torque_noise(noise, tmp_path / "n.toml")
         assert find_torque_noise(tmp_path / "n.toml") == noise
         good = (tmp_path / "n.toml").read_text()
         for old, new, said in (
             ("order = 2", "order = 3", "'order' must be 1 or 2"), ("torque = 7.5", "torque = -1", "'torque' must be above 0"),
+            ("balance = 1", "balance = 2", "'balance' must be 0 or 1"),
             ("slip", "slop", "'slop' is not known"), ('name = "mine"', 'name = "driver"', "built-in"),
         ):  # fmt: skip
             (tmp_path / "bad.toml").write_text(good.replace(old, new))

@@ -1,10 +1,11 @@
-"""The noise of a driver-torque filter from a record, by maximum likelihood: order of the torque's walk, and four sizes.
+"""The noise of a driver-torque filter from a record, by maximum likelihood: what walks and how, and four sizes.
 
     log L = -1/2 sum [ log(2 pi f s) + e^2 / (f s) ],   f = max(mean of e^2 / s, floor / r)
 
 e, s: innovation of the angle and its variance by a filter with encoder variance r = 1. One factor f of all noises leaves e
-alone, so its best value is known, and three ratios are searched (Nelder, Mead), from several starts, for either order. Both orders
-have as many parameters, so the likelier one is taken. The floor is an encoder's: a twelfth of its squared step.
+alone, so its best value is known, and three ratios are searched (Nelder, Mead), from several starts, for either order and
+balance of the walk. All kinds have as many parameters, so the likeliest is taken. The floor is an encoder's: a twelfth of its
+squared step.
 
 Rows count that have a second of known torque behind them, without a jump. At most LONGEST seconds are looked at, taken in equal
 parts from all over the record.
@@ -13,7 +14,7 @@ parts from all over the record.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
@@ -52,13 +53,13 @@ class TorqueFit:
 
     Attributes:
         noise: the likelier order's.
-        log_likelihood: of each order.
+        log_likelihood: of each kind: order of the walk, and balance.
         rows: innovations that counted.
         seconds: of the record that was looked at.
     """
 
     noise: TorqueNoise
-    log_likelihood: Mapping[int, float]
+    log_likelihood: Mapping[tuple[int, int], float]
     rows: int
     seconds: float
 
@@ -94,16 +95,21 @@ def fit_torque_noise(
         )  # fmt: skip
     steps = [_step_of(run.grid.values[ANGLE][run.grid.fresh[ANGLE]]) for run in runs]
     floor = min(steps) ** 2 / 12
-    best: dict[int, tuple[float, TorqueNoise]] = {}
+    best: dict[tuple[int, int], tuple[float, TorqueNoise]] = {}
     for order in ORDERS:
         program = _likelihood(J, b, dt, order)
-        found = _search(partial(_evidence, program, rows, J, floor))
-        value, factor = _evidence(program, rows, J, floor, found)
-        angle, slip, rate_noise, torque = (float(np.sqrt(factor * q)) for q in (1.0, *_intensities(found, J)))
-        origin = f"maximum likelihood on {source}"
-        best[order] = value, TorqueNoise(order, angle, slip, rate_noise, torque, origin, label)
-    order = max(best, key=lambda o: best[o][0])
-    return TorqueFit(best[order][1], {o: value for o, (value, _) in best.items()}, int(counted.sum()), rows.seconds)
+        for balance in (0, 1):
+            seen = rows.turned_by(1.0 - balance)
+            found = _search(partial(_evidence, program, seen, J, floor))
+            value, factor = _evidence(program, seen, J, floor, found)
+            angle, slip, rate_noise, torque = (float(np.sqrt(factor * q)) for q in (1.0, *_intensities(found, J)))
+            origin = f"maximum likelihood on {source}"
+            noise = TorqueNoise(order, angle, slip, rate_noise, torque, origin, label, balance)
+            best[order, balance] = value, noise
+    likeliest = max(best, key=lambda kind: best[kind][0])
+    return TorqueFit(
+        best[likeliest][1], {kind: value for kind, (value, _) in best.items()}, int(counted.sum()), rows.seconds
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +119,11 @@ class _Rows:
     grid: Grid
     counted: Flags
     seconds: float
+
+    def turned_by(self, share: float) -> _Rows:
+        """The same with a share of the column's torque turning the wheel."""
+        values = {**self.grid.values, "torque": share * self.grid.values["torque"]}
+        return replace(self, grid=replace(self.grid, values=values))
 
 
 def _rows(columns: Mapping[str, Array], grid: Grid, longest: float) -> _Rows:

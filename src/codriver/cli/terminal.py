@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 # Of an estimate's settings, those that are told, in this order.
-SETTINGS = ("vehicle", "known_torque", "ell", "preset", "order", "form", "smoother")
+SETTINGS = ("vehicle", "known_torque", "ell", "preset", "order", "balance", "form", "smoother")
 _STYLE = {"ok": "green", "warn": "yellow", "bad": "red"}
 
 

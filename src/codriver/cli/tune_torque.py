@@ -49,7 +49,7 @@ def _told(name: str, fit: TorqueFit, rate: float, out: Path | None) -> dict[str,
     noise = fit.noise
     return {
         "estimator": name, "rate_hz": rate, "counted": fit.rows, "looked_at_s": round(fit.seconds, 3),
-        "log_likelihood": {str(order): value for order, value in fit.log_likelihood.items()},
+        "log_likelihood": {f"order {o}, balance {c}": value for (o, c), value in fit.log_likelihood.items()},
         "preset": {"name": noise.name, "source": noise.source, **{k: v for k, v in noise.settings().items() if k != "preset"}},
         "result": str(out) if out is not None else None,
     }  # fmt: skip
@@ -65,11 +65,12 @@ def _say(fit: TorqueFit, told: dict[str, Any]) -> None:
 
     screen, noise = console(), fit.noise
     walk = "a random walk" if noise.order == 1 else "an integrated random walk"
-    other = min(fit.log_likelihood.values()) - max(fit.log_likelihood.values())
+    what = "the driver's torque" if noise.balance == 0 else "the driver's torque beyond what bears the column's"
+    others = sorted(fit.log_likelihood.values(), reverse=True)
     per = "N m per sqrt(s)" if noise.order == 1 else "N m/s per sqrt(s)"
     screen.print(
         f"[bold]{told['estimator']}[/] tuned at {told['rate_hz']:g} Hz on {fit.seconds:.0f} s, {fit.rows} angles that count\n"
-        f"the torque is {walk} (log likelihood of the other order {other:+.0f})\n\n"
+        f"{what} is {walk} (log likelihood of the next best kind {others[1] - others[0]:+.0f})\n\n"
         f"  angle   {noise.angle * 180 / pi:.4g} deg, a sample\n  slip    {noise.slip * 180 / pi:.3g} deg per sqrt(s)\n"
         f"  rate    {noise.rate:.3g} rad/s per sqrt(s)\n  torque  {noise.torque:.3g} {per}"
     )

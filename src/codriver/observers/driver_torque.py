@@ -1,20 +1,23 @@
 """The driver's torque on a steering wheel, from its angle and what else acts on the column.
 
     delta' = omega,   J_s omega' + b_s omega = T_dr + T_k                       2019 eq. (27)-(29); T_k from `column`
-    T_dr' = w         or   T_dr'' = w                                           (31), and its integrated form
+    q = T_dr + c T_k,   q' = w   or   q'' = w                                   (31), and its integrated form; c is 0 or 1
     y = delta + n
 
-A Kalman filter of [delta, omega, T_dr(, T_dr')], T_k straight between ticks (`disturbance_design`, `augmented_kalman`). T_k does
+What walks by chance is the driver's torque (c = 0), or what is left of it where the driver mostly bears T_k (c = 1): then T_k does
+not turn the wheel, and a change of T_k is the driver's at once. `torque_noise` says which; a fit to the record decides.
+
+A Kalman filter of [delta, omega, q(, q')], T_k straight between ticks (`disturbance_design`, `augmented_kalman`). T_k does
 not depend on the filter's state, only on measured angle, log and vehicle, so the filter is linear and its certificate holds.
 
-    var(T_dr) = P_TT + var(T_k) + (omega' sd(J_s))^2 + (omega sd(b_s))^2
+    var(T_dr) = P_qq + var(T_k) + (omega' sd(J_s))^2 + (omega sd(b_s))^2
 
 so the band holds what the filter, the column and the vehicle file do not know. That part does not average out over time.
 
 * Start: at the first angle, the rest wide. A jump of the encoder, or an innovation beyond GATE standard deviations and a degree,
   starts the filter anew from the new angle and is told by `angle_jump`; wraps are taken out (`angle_row`).
 * T_k missing: what is known of T_dr is forgotten, and `inputs_known` is 0.
-* `valid`: T_k is known, the wheel is not at its end stop, and P_TT is at most SETTLED times the stationary one.
+* `valid`: T_k is known, the wheel is not at its end stop, and P_qq is at most SETTLED times the stationary one, or SURE^2.
 """
 
 from __future__ import annotations
@@ -38,6 +41,7 @@ from codriver.vehicles import Vehicle
 
 ANGLE = "steering_wheel_angle"
 GATE, LEAST_GATE = 12.0, np.pi / 180  # standard deviations, and rad
+SURE = 0.05  # N m
 RATE_SD, TORQUE_SD, SLOPE_SD = 5.0, 20.0, 100.0  # at the start: rad/s, N m, N m/s
 
 
@@ -77,20 +81,22 @@ def driver_torque_observer(
     J, b = vehicle.number("steering_inertia"), vehicle.number("steering_damping")
     sd_J, sd_b = (_sd(vehicle, p) for p in ("steering_inertia", "steering_damping"))
     stop = vehicle.number("steering_end_stop") if "steering_end_stop" in vehicle else inf
-    limit = SETTLED * float(design.P[2, 2])
+    limit = settled_variance(float(design.P[2, 2]))
+    turning = 1.0 - noise.balance  # the share of T_k that turns the filter's wheel
 
     def step(carry: Scalars, u: Scalars, y: Scalars, ok: Scalars, rho: Scalars) -> tuple[Scalars, Scalars]:
         """One tick: mend the angle, gather what acts on the column, filter, judge."""
         row = angle_row(carry, y[ANGLE], ok[ANGLE], dt, stop)
+        before = turning * carry["torque_before"]
         moment = column.at({key: carry[key] for key in column.carry}, u, ok, row.angle, row.moved)
         torque = select(moment.known, moment.torque, carry["torque_before"])
-        predicted = predict(kalman, unpack(carry, n), [carry["torque_before"]], [torque])
+        predicted = predict(kalman, unpack(carry, n), [before], [turning * torque])
         e = row.angle - predicted.x[0]
         gate = GATE**2 * (predicted.P[0][0] + kalman.R[0])
         beyond = both(both(row.fresh, both(carry["begun"], e * e > gate)), e * e > LEAST_GATE**2)
         anew = either(row.first, either(row.jumped, beyond))
         use = both(row.fresh, both(row.memory["begun"], negate(anew)))
-        now, (told,) = update(kalman, predicted, [row.angle], [use], [torque])
+        now, (told,) = update(kalman, predicted, [row.angle], [use], [turning * torque])
         restart = [row.angle, select(row.first, 0.0, predicted.x[1]), *predicted.x[2:]]
         now = chosen(anew, started(kalman, restart), now)
         now = forget(now, negate(moment.known), wide, range(2, n))
@@ -101,9 +107,9 @@ def driver_torque_observer(
         new = {
             **pack(now), "torque_before": torque, **{key: moment.memory[key] for key in column.carry}, **row.memory,
         }  # fmt: skip
-        more = moment.variance + _by_parameters(now, torque, J, b, sd_J, sd_b)
+        more = moment.variance + _by_parameters(now, turning * torque, J, b, sd_J, sd_b)
         out = {
-            "steering_wheel_angle": now.x[0], "steering_wheel_rate": now.x[1], "driver_torque": now.x[2],
+            "steering_wheel_angle": now.x[0], "steering_wheel_rate": now.x[1], "driver_torque": now.x[2] - noise.balance * torque,
             "steering_wheel_angle_sd": sqrt(now.P[0][0]), "steering_wheel_rate_sd": sqrt(now.P[1][1]),
             "driver_torque_sd": sqrt(now.P[2][2] + more), "column_torque": torque,
             "steering_wheel_angle_innovation": select(use, told.e, 0.0),
@@ -121,6 +127,14 @@ def driver_torque_observer(
         settings={"vehicle": vehicle.name, "dt": dt, "J_s": J, "b_s": b, **column.settings, **noise.settings()},
         gains={**gains, "R": np.diag(design.R)}, certificate=design.certificate,
     )  # fmt: skip
+
+
+def settled_variance(stationary: float) -> float:
+    """The variance of the torque, (N m)^2, up to which an estimate counts as settled.
+
+    A filter that expects hardly any change of the torque takes for ever to reach its own stationary variance; SURE is enough.
+    """
+    return max(SETTLED * stationary, SURE**2)
 
 
 def filter_of(design: DisturbanceDesign, wide: list[float]) -> Filter:

@@ -1,7 +1,9 @@
 """What drives a steering wheel's unknown torque, and what disturbs its encoder: the noise of the driver-torque filters.
 
-    order 1   T_dr' = torque * w                    a random walk: a driver who changes the torque at any moment
-    order 2   T_dr' = s,  s' = torque * w           an integrated one: a torque that runs on as it does
+    q = T_dr + balance * T_k                        what changes by chance: balance 0, the driver's torque; 1, what is left of it
+                                                    when the driver bears all else that acts on the column, T_k
+    order 1   q' = torque * w                       a random walk: it changes at any moment
+    order 2   q' = s,  s' = torque * w              an integrated one: it runs on as it does
     omega'  = ... + rate * w                        what jolts the wheel beside all torques
     delta'  = omega + slip * w                      what the encoder does beside the wheel: play, a soft column
     y       = delta + angle * n                     n of each sample of the encoder
@@ -12,6 +14,7 @@ maximum likelihood on a record; a file holds them:
     name = "rig"
     source = "fitted on drive.csv"
     order = 1
+    balance = 0
     angle = 0.0005     # rad
     slip = 0.0         # rad per sqrt(s)
     rate = 0.01        # rad/s per sqrt(s)
@@ -32,8 +35,10 @@ from codriver.toml_file import parse_tables, read_text
 from codriver.whole_file import write_text
 
 _NUMBERS = ("angle", "slip", "rate", "torque")
-_KEYS = ("name", "source", "order", *_NUMBERS)
-_EXPECTED = "name, source, order (1 or 2), angle, slip, rate and torque (numbers; angle and torque above 0)"
+_KEYS = ("name", "source", "order", "balance", *_NUMBERS)
+_EXPECTED = (
+    "name, source, order (1 or 2), balance (0 or 1), angle, slip, rate and torque (numbers; angle and torque above 0)"
+)
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,7 @@ class TorqueNoise:
         rate: of the one that jolts the rate, rad/s per sqrt(s).
         torque: of the one that drives the torque, N m per sqrt(s), or N m/s per sqrt(s) at order 2.
         source, name: where it comes from, and what it is called.
+        balance: 0 if the torque itself walks, 1 if its sum with what else acts on the column does.
     """
 
     order: int
@@ -56,6 +62,7 @@ class TorqueNoise:
     torque: float
     source: str = "given"
     name: str = "own"
+    balance: int = 0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be.
@@ -65,13 +72,13 @@ class TorqueNoise:
         """
         numbers = (self.angle, self.slip, self.rate, self.torque)
         sizes = all(map(isfinite, numbers)) and min(self.angle, self.torque) > 0 and min(self.slip, self.rate) >= 0
-        if self.order not in (1, 2) or not sizes:
-            raise UsageError(f"order {self.order}, noises {numbers}", _EXPECTED, "correct them")
+        if self.order not in (1, 2) or self.balance not in (0, 1) or not sizes:
+            raise UsageError(f"order {self.order}, balance {self.balance}, noises {numbers}", _EXPECTED, "correct them")
 
     def settings(self) -> dict[str, str | float]:
         """For provenance."""
         return {
-            "preset": self.name, "order": self.order, "angle_noise": self.angle, "slip_noise": self.slip,
+            "preset": self.name, "order": self.order, "balance": self.balance, "angle_noise": self.angle, "slip_noise": self.slip,
             "rate_noise": self.rate, "torque_noise": self.torque,
         }  # fmt: skip
 
@@ -118,8 +125,9 @@ def parse_torque_noise(text: str, where: str) -> TorqueNoise:
     faults += [f"'{key}' is missing" for key in _KEYS if key not in table]
     faults += [f"'{key}' must be a text" for key in ("name", "source") if not isinstance(table.get(key, ""), str)]
     faults += [f"'{key}' must be a number" for key in _NUMBERS if not _number(table.get(key, 1.0))]
-    if isinstance(table.get("order", 1), bool) or table.get("order", 1) not in (1, 2):
-        faults.append("'order' must be 1 or 2")
+    for key, allowed in (("order", (1, 2)), ("balance", (0, 1))):
+        if isinstance(table.get(key, 1), bool) or table.get(key, 1) not in allowed:
+            faults.append(f"'{key}' must be {allowed[0]} or {allowed[1]}")
     faults += [
         f"'{key}' must be above 0" for key in ("angle", "torque") if _number(table.get(key)) and not table[key] > 0
     ]
@@ -133,7 +141,9 @@ def parse_torque_noise(text: str, where: str) -> TorqueNoise:
             f"{where}: {'; '.join(faults)}", _EXPECTED, "mend the file, or write it with `codriver tune driver-torque`"
         )
     angle, slip, rate, torque = (float(table[key]) for key in _NUMBERS)
-    return TorqueNoise(int(table["order"]), angle, slip, rate, torque, table["source"], table["name"])
+    return TorqueNoise(
+        int(table["order"]), angle, slip, rate, torque, table["source"], table["name"], int(table["balance"])
+    )
 
 
 def save_torque_noise(noise: TorqueNoise, path: str | Path) -> None:
@@ -149,6 +159,8 @@ def save_torque_noise(noise: TorqueNoise, path: str | Path) -> None:
     text = (
         f"name = {_quoted(noise.name)}\nsource = {_quoted(noise.source)}\n"
         f"# of the torque's random walk: 1, or 2 for an integrated one\norder = {noise.order}\n"
+        "# what walks: 0 the driver's torque, 1 its sum with what else acts on the column\n"
+        f"balance = {noise.balance}\n"
         f"angle = {noise.angle!r}  # rad, of a sample\nslip = {noise.slip!r}  # rad per sqrt(s)\n"
         f"rate = {noise.rate!r}  # rad/s per sqrt(s)\n"
         f"torque = {noise.torque!r}  # {per}\n"

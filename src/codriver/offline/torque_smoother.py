@@ -14,8 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from codriver.observers.augmented_kalman import pairs
-from codriver.observers.disturbance import SETTLED
-from codriver.observers.driver_torque import ANGLE
+from codriver.observers.driver_torque import ANGLE, settled_variance
 from codriver.observers.observer import Observer
 from codriver.offline.passes import Names, fixed_interval, fixed_lag
 from codriver.offline.smoothed import SmoothedEstimate, with_memory
@@ -49,7 +48,8 @@ def smooth_torque(observer: Observer, log: Log, lag: float | None) -> SmoothedEs
     names = Names(size)
     memory = {name: columns.pop(name) for name in (*means, *covariances)}
     filtered: dict[str, Array] = dict(zip([*names.x, *names.P], memory.values(), strict=True))
-    torque = columns["column_torque"]
+    column, balance = columns["column_torque"], float(observer.settings["balance"])
+    torque = (1.0 - balance) * column
     after = np.append(torque[1:], torque[-1:])
     F, G_0, G_1, Q_d = (observer.gains[letter] for letter in ("F", "G_0", "G_1", "Q_d"))
     filtered |= {name: G_0[i, 0] * torque + G_1[i, 0] * after for i, name in enumerate(names.shift)}
@@ -62,9 +62,10 @@ def smooth_torque(observer: Observer, log: Log, lag: float | None) -> SmoothedEs
             left_open = columns[f"{name}_sd"] ** 2 - memory[f"P_{i}{i}"]
             # Rounding may leave a variance of 0 a hair below it.
             spread = np.sqrt(np.maximum(moments[f"S{i}{i}"] + left_open, 0.0))
-            columns[name] = np.where(known, moments[f"m{i}"], columns[name])
+            found = moments[f"m{i}"] - (balance * column if name == "driver_torque" else 0.0)
+            columns[name] = np.where(known, found, columns[name])
             columns[f"{name}_sd"] = np.where(known, spread, columns[f"{name}_sd"])
-        sure = moments["S22"] <= SETTLED * float(observer.gains["P"][2, 2])
+        sure = moments["S22"] <= settled_variance(float(observer.gains["P"][2, 2]))
         columns["valid"] = (known & sure & ~run.flag("at_end_stop")).astype(float)
     said = {**provenance(observer), "smoother": "fixed interval" if lag is None else f"fixed lag of {ticks * dt:g} s"}
     return SmoothedEstimate(

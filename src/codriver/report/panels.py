@@ -21,7 +21,7 @@ from codriver.estimate import Estimate
 from codriver.observers import Output
 from codriver.report.parts import Band, Line, Panel
 from codriver.report.shown import shown, shown_unit, words
-from codriver.report.torque_panels import DRAWN, torque_panels
+from codriver.report.torque_panels import DRAWN, of_our_own, torque_panels
 from codriver.signals import Log
 from codriver.signals.signal import Array
 from codriver.summary import measured_on_ticks
@@ -45,7 +45,7 @@ def panels(estimate: Estimate, truth: Log | None = None) -> list[Panel]:
     """The panels that this estimate can fill."""
     measured = _Measured(estimate)
     reference = _Truth(estimate, truth)
-    torque = [] if "driver_torque" not in estimate else torque_panels(
+    torque = [] if not of_our_own(estimate) else torque_panels(
         estimate, _estimated(estimate, "driver_torque"), reference(("driver_torque", "true", "dot"))
     )  # fmt: skip
     special = (*SPECIAL, *(DRAWN if torque else ()))

@@ -9,12 +9,18 @@ import numpy as np
 
 from codriver.estimate import Estimate
 from codriver.measured_torque import RESTART, SENSORS, on_ticks, reproduce_angle
+from codriver.observers import ESTIMATORS
 from codriver.report.parts import Band, Line, Panel
 from codriver.report.shown import number, shown, shown_unit
 from codriver.signals.signal import Array
 
 ORANGE, GREEN, GREY, BLACK = "#E69F00", "#007A5A", "#757575", "#1a1a1a"
 DRAWN = ("driver_torque", "steering_wheel_angle", "steering_wheel_rate", "hands_on")
+
+
+def of_our_own(estimate: Estimate) -> bool:
+    """Whether it is of one of our estimators of the driver's torque; others have the panels of any estimate."""
+    return "driver_torque" in estimate and ("column_torque" in estimate.columns or estimate.observer in ESTIMATORS)
 
 
 def torque_panels(estimate: Estimate, curves: list[Line | Band], truth: list[Line]) -> list[Panel]:
@@ -25,7 +31,7 @@ def torque_panels(estimate: Estimate, curves: list[Line | Band], truth: list[Lin
         curves: the estimated torque, with its band.
         truth: the true torque, where it is known.
     """
-    if "driver_torque" not in estimate:
+    if not of_our_own(estimate):
         return []
     panels = [_torque(estimate, curves, truth), _hands(estimate), _column(estimate), _angle(estimate)]
     return [panel for panel in panels if panel is not None]

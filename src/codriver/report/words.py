@@ -6,13 +6,14 @@ from codriver.estimate import Estimate
 from codriver.observers import ESTIMATORS
 from codriver.report.numbers import JERKS, expected_lag
 from codriver.report.shown import words
+from codriver.report.torque_panels import of_our_own
 
 
 def subject(estimate: Estimate) -> str:
     """What the report is about, for its title."""
     if any(name.startswith("intentional_") for name in estimate):
         return "Driver intention"
-    if "driver_torque" in estimate:
+    if of_our_own(estimate):
         return "Driver's steering torque"
     if any(name in estimate for name in ("longitudinal_acceleration", "longitudinal_jerk")):
         return "Vehicle acceleration and jerk"
@@ -45,7 +46,7 @@ def how_to_read(estimate: Estimate) -> list[str]:
             "taken out. They hold what the driver did, but also gear shifts, the brake's release at a stop and "
             "bumps: without pedals or torque these cannot be told apart."
         )
-    if "driver_torque" in estimate:
+    if of_our_own(estimate):
         said.append(
             "The driver's torque is what turns the wheel beside all that is known to act on the column: angle and rate tell how "
             "the wheel moved, inertia and damping what torque that took, and the tyres' or motor's torque less friction is "
@@ -77,7 +78,7 @@ def how_to_read(estimate: Estimate) -> list[str]:
             "The band holds the true value 95% of the time if the model and the vehicle's parameters are right. "
             + (
                 "It covers the encoder's noise, friction, and the standard deviations in the vehicle file, but no wrong file."
-                if "driver_torque" in estimate
+                if of_our_own(estimate)
                 else "It covers the sensors' noise, not a wrong mass or a wrong coefficient."
             )
         )
