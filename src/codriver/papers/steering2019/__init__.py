@@ -40,14 +40,25 @@ def reproduce(tell: Tell, quick: bool, recordings: Path | None) -> Reproduction:
     tell("weighing, chirping and driving on the rig")
     lab = visit_lab()
     simulator, drive = simulator_chapter(lab, visit_lab(0.0, CHIRP_ALONE)), drive_chapter(lab)
-    chapters = (identified, robust, designed, torque, compared, bands, simulator, drive, *recorded_chapters(recordings, tell))
+    chapters = (
+        identified,
+        robust,
+        designed,
+        torque,
+        compared,
+        bands,
+        simulator,
+        drive,
+        *recorded_chapters(recordings, tell),
+    )
     return Reproduction(
         "steering2019",
         "The driver's steering torque without a torque sensor (2019, sections 3 and 4), made again",
         PAPERS["steering2019"][1],
-        "Every table, figure and claim of sections 3 and 4 beside what codriver finds: the paper's simulated wheel with many seeds in "
-        "place of one, Kalman filters and smoothers beside its PI observer, a simulated rig in place of its driving simulator, and "
-        "recordings of real vehicles whose torque is known. The recordings of the paper itself were never published.",
+        "Every table, figure and claim of sections 3 and 4 beside what codriver finds: the paper's simulated wheel with many "
+        "seeds in place of one, Kalman filters and smoothers beside its PI observer, a simulated rig in place of its driving "
+        "simulator, and recordings of real vehicles whose torque is known. The recordings of the paper itself were never "
+        "published.",
         chapters,
-        (("seeds", str(seeds)), ("noise", "eq. (84) read as dt w, preset okamoto2019; the other readings beside it")),
+        (("seeds", str(seeds)), ("noise (84)", "dt w")),
     )  # fmt: skip

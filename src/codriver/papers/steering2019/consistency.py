@@ -22,7 +22,7 @@ from codriver.offline.smoothed import with_memory
 from codriver.papers.item import Item
 from codriver.papers.reproduction import Chapter
 from codriver.papers.steering2019.filters import kalman
-from codriver.papers.steering2019.runs import DEGREE, DT, DrivenRuns, driven_runs, run_all
+from codriver.papers.steering2019.runs import DEGREE, DT, WORDS, DrivenRuns, driven_runs, run_all
 from codriver.report.document import Chart, Curve, Plot, Table
 from codriver.signals.signal import Array
 from codriver.torque_fit import fit_torque_noise
@@ -133,18 +133,19 @@ def consistency_chapter(seeds: int) -> Chapter:
             items.append(Item(
                 f"{which.upper()} of the Kalman filter, torque a {walk}: {dimension} is expected", None, mean, "1",
                 low < mean < high and c.inside(which) > 0.98,
-                f"not in the paper; bounds of {CONFIDENCE:.1%} for {c.records} records: {low:.3f} to "
-                f"{high:.3f}; {c.inside(which):.1%} of the ticks are inside",
+                f"not in the paper; bounds of {CONFIDENCE:.1%} for {c.records} records: {low:.3f} to {high:.3f}; "
+                f"{c.inside(which):.1%} of the ticks are inside",
             ))  # fmt: skip
     c = sines["derivative"]
     items.append(Item(
-        "the band on the paper's sinusoids, noise fitted by likelihood", "95 %", f"{100 * c.covered:.0f} % of the torques inside", "",
-        0.9 <= c.covered, f"a sine is no random walk: NEES {c.mean_nees:.2f} where 3 is expected, NIS {c.mean_nis:.2f}. At least 90 % counts. "
-        f"White noise of 0.01 dt: {100 * sines['continuous'].covered:.0f} %. The paper's PI observer has no band",
+        "the band on the paper's sinusoids, noise fitted by likelihood", "95 %", f"{100 * c.covered:.0f} % of the torques inside",
+        "",
+        c.covered >= 0.9, f"a sine is no random walk: NEES {c.mean_nees:.2f} where 3 is expected, NIS {c.mean_nis:.2f}. At least "
+        f"90 % counts. White noise of 0.01 dt: {100 * sines['continuous'].covered:.0f} %. The paper's PI observer has no band",
     ))  # fmt: skip
     words = (
-        "The paper gives its estimate of the torque no error bar. The Kalman filters do; where the model is right their errors must be as "
-        "large as they say.",
+        "The paper gives its estimate of the torque no error bar. The Kalman filters do; where the model is right their errors "
+        "must be as large as they say.",
     )
     return Chapter("Are the bands honest? NEES and NIS", words, (_chart(own), _table(own, sines)), tuple(items))
 
@@ -156,17 +157,25 @@ def _chart(own: Mapping[int, Consistency]) -> Chart:
         curves = []
         for (order, c), color in zip(own.items(), ("#0072B2", "#C84C00"), strict=True):
             values = (c.nis if which == "nis" else c.nees)[SKIP::5]
-            time = DT * np.arange(c.nis.size)[SKIP::5]
+            time = DT * np.arange(c.nis.size, dtype=np.float64)[SKIP::5]
             curves.append(Curve(f"{which.upper()}, order {order}", time, values, color, width=1.0))
         plots.append(Plot(which.upper(), tuple(curves), 160, (low, float(dimension), high)))
     return Chart(
-        "NIS and NEES over time, mean of the records", "time (s)", tuple(plots), f"Dotted: the expected value and its {CONFIDENCE:.1%} bounds."
+        "NIS and NEES over time, mean of the records", "time (s)", tuple(plots), "Dotted: the expected value and its "
+        f"{CONFIDENCE:.1%} bounds."
     )  # fmt: skip
 
 
 def _table(own: Mapping[int, Consistency], sines: Mapping[str, Consistency]) -> Table:
-    rows = [(f"its own random walk, order {order}", c.mean_nis, c.mean_nees, f"{c.covered:.1%}") for order, c in own.items()]
-    rows += [(f"the paper's sinusoids, {reading}", c.mean_nis, c.mean_nees, f"{c.covered:.1%}") for reading, c in sines.items()]
-    return Table(("torque", "NIS (1)", "NEES (3)", "in the 95 % band"), tuple(rows), "Means from 1 s on; the expected value in brackets.")
-
-
+    rows = [
+        (f"its own random walk, order {order}", c.mean_nis, c.mean_nees, f"{c.covered:.1%}") for order, c in own.items()
+    ]
+    rows += [
+        (f"the paper's sinusoids, noise {WORDS[reading]}", c.mean_nis, c.mean_nees, f"{c.covered:.1%}")
+        for reading, c in sines.items()
+    ]
+    return Table(
+        ("torque", "NIS (1)", "NEES (3)", "in the 95 % band"),
+        tuple(rows),
+        "Means from 1 s on; the expected value in brackets.",
+    )

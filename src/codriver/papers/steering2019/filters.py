@@ -10,15 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import log
 
 import numpy as np
 
 import codriver.program as programs
 from codriver.observers.column import logged_column
 from codriver.observers.driver_torque import driver_torque_observer
-from codriver.observers.pi_weights import PIWeights, wheel_pi_design
 from codriver.observers.observer import Observer
+from codriver.observers.pi_weights import PIWeights, wheel_pi_design
 from codriver.observers.torque_noise import TorqueNoise
 from codriver.offline.torque_smoother import smooth_torque
 from codriver.papers.item import Item
@@ -28,7 +27,6 @@ from codriver.papers.steering2019.runs import (
     DEGREE,
     DT,
     J_S,
-    QUIET,
     WORDS,
     DrivenRuns,
     between,
@@ -50,8 +48,15 @@ TUNED, TUNING_SEED = 10, 1000
 EVALUATIONS = 60
 KINDS = ("none", "derivative", "continuous", "step", "calm", "busy")
 DRIVERS = {"calm": RigDriver(), "busy": RigDriver(lag=0.04, wander=0.15, tremor=0.4)}
-TOLD = {**WORDS, "calm": "torque of a calm driver, dt w", "busy": "torque of a busy driver, dt w"}
-WAYS = ("PI, paper's V", "PI, best V", "Kalman, random walk", "Kalman, integrated walk", "Kalman, likelier order", "its smoother")
+TOLD = {**WORDS, "calm": "a calm driver, dt w", "busy": "a busy driver, dt w"}
+WAYS = (
+    "PI, paper's V",
+    "PI, best V",
+    "Kalman, random walk",
+    "Kalman, integrated walk",
+    "Kalman, by likelihood",
+    "its smoother",
+)
 # Of the best-tuned PI observer for the causal filter, and of the paper's PI observer for the smoother.
 LIMITS = {"derivative": (0.6, 0.1), "continuous": (0.85, 0.2)}
 
@@ -62,20 +67,24 @@ class Compared:
 
     Attributes:
         errors: by way, N m, mean of the records.
-        order: of the random walk that is likelier.
         noise: what the likelihood found for it.
         weights: the PI observer's at its best.
     """
 
     errors: dict[str, float]
-    order: int
     noise: TorqueNoise
     weights: PIWeights
 
     @property
+    def model(self) -> str:
+        """What the likelihood takes to walk."""
+        walk = ("walk", "integrated walk")[self.noise.order - 1]
+        return f"{walk} of the sum" if self.noise.balance else walk
+
+    @property
     def causal(self) -> float:
         """Of the Kalman filter whose order the likelihood chose, over the best-tuned PI observer."""
-        return self.errors["Kalman, likelier order"] / self.errors["PI, best V"]
+        return self.errors["Kalman, by likelihood"] / self.errors["PI, best V"]
 
     @property
     def smoothed(self) -> float:
@@ -98,12 +107,12 @@ def compare_filters(kind: str, seeds: int, smoothed: int) -> Compared:
         "PI, best V": _judge(wheel_pi(weights, "straight").observer, judged),
         "Kalman, random walk": _judge(kalman(walks[1], car), judged),
         "Kalman, integrated walk": _judge(kalman(walks[2], car), judged),
-        "Kalman, likelier order": _judge(kalman(likely, car), judged),
+        "Kalman, by likelihood": _judge(kalman(likely, car), judged),
     }
     observer = kalman(likely, car)
     hindsight = [smooth_torque(observer, judged.log(run), None).columns["driver_torque"] for run in range(smoothed)]
     errors["its smoother"] = float(rmse(np.array(hindsight), judged.driver[:smoothed], SKIP).mean())
-    return Compared(errors, likely.order, likely, weights)
+    return Compared(errors, likely, weights)
 
 
 @cache
@@ -138,12 +147,18 @@ def _rough(driver: RigDriver, runs: int, seed: int) -> DrivenRuns:
         )
         for k, (a, d, p) in enumerate(zip(aligned, torque, pieces, strict=True))
     ]  # fmt: skip
-    angle, rate, measured = (np.concatenate(x) for x in zip(*((m.angle, m.rate, m.measured) for m in made), strict=True))
+    angle, rate, measured = (
+        np.concatenate(x) for x in zip(*((m.angle, m.rate, m.measured) for m in made), strict=True)
+    )
     return DrivenRuns(made[0].time, aligned, torque, angle, rate, measured)
 
 
 def _judge(observer: Observer, records: DrivenRuns) -> float:
-    return float(rmse(run_all(programs.compile(observer, ("driver_torque",)), records)["driver_torque"], records.driver, SKIP).mean())
+    return float(
+        rmse(
+            run_all(programs.compile(observer, ("driver_torque",)), records)["driver_torque"], records.driver, SKIP
+        ).mean()
+    )
 
 
 def _best_weights(tuning: DrivenRuns) -> PIWeights:
@@ -195,38 +210,43 @@ def filters_chapter(seeds: int, smoothed: int, kinds: Sequence[str] = KINDS) -> 
     items = []
     for kind, (causal, hindsight) in LIMITS.items():
         c = found[kind]
-        best = c.errors["Kalman, likelier order"]
+        best = c.errors["Kalman, by likelihood"]
         items += [
-            Item(f"the best causal filter against the PI observer at its best, {TOLD[kind]}", None, c.causal, "1", c.causal <= causal,
-                 f"not in the paper; {best:.3f} against {c.errors['PI, best V']:.3f} N m; at most {causal} counts. Order "
-                 f"{c.order} and noise by likelihood of the angle, no truth seen"),
+            Item(f"the best causal filter against the PI observer at its best, {TOLD[kind]}", None, c.causal, "1",
+                 c.causal <= causal,
+                 f"not in the paper; {best:.3f} against {c.errors['PI, best V']:.3f} N m; at most {causal} counts. Model "
+                 f"({c.model}) and noise by likelihood of the angle, no truth seen"),
             Item(f"its smoother against the paper's PI observer, {TOLD[kind]}", None, c.smoothed, "1", c.smoothed <= hindsight,
-                 f"not in the paper; {c.errors['its smoother']:.3f} against {c.errors[WAYS[0]]:.3f} N m; at most {hindsight} counts"),
+                 f"not in the paper; {c.errors['its smoother']:.3f} against {c.errors[WAYS[0]]:.3f} N m; at most {hindsight} "
+                 "counts"),
         ]  # fmt: skip
     step = found["step"].errors
-    wins = step["Kalman, likelier order"] < step["PI, best V"]
     items += [
-        Item("where the Kalman filter does not win: 0.01 a step", None,
-             f"{step['Kalman, likelier order']:.2f} against {step['PI, best V']:.2f} N m", "", None,
-             f"not in the paper; {'less' if wins else 'no less'} than the PI observer at its best, and with little between them. With noise that "
-             "large all have to average alike, and an integrated walk is worse than a plain one"),
+        Item("0.01 a step: a PI observer at its best is as good as a Kalman filter", None,
+             f"{step['PI, best V']:.2f} against {step['Kalman, by likelihood']:.2f} N m", "",
+             step["PI, best V"] <= 1.05 * step["Kalman, by likelihood"],
+             "not in the paper; within 5 % counts. With noise that large all have to average alike; an integrated walk is worse: "
+             f"{step[WAYS[3]]:.2f}. The paper's V: {step[WAYS[0]]:.2f}"),
         *(_by_likelihood(found[kind], kind) for kind in DRIVERS if kind in found),
         Item("section 7: the PI observer accurately estimated the torque", "accurately",
              f"{found['derivative'].errors[WAYS[0]] / (3 / 2**0.5):.0%} of the torque's RMS", "",
              found["derivative"].errors[WAYS[0]] <= 1.5 * found["derivative"].errors[WAYS[4]],
-             f"noise dt w; with the same angles a Kalman filter is {found['derivative'].errors[WAYS[4]] / (3 / 2**0.5):.0%} off, its "
-             f"smoother {found['derivative'].errors[WAYS[5]] / (3 / 2**0.5):.0%}. At most 1.5 times the Kalman filter counts"),
+             f"noise dt w; with the same angles a Kalman filter is {found['derivative'].errors[WAYS[4]] / (3 / 2**0.5):.0%} off, "
+             f"its smoother {found['derivative'].errors[WAYS[5]] / (3 / 2**0.5):.0%}. At most 1.5 times the Kalman filter "
+             "counts"),
     ]  # fmt: skip
-    rows = tuple((TOLD[kind], *(found[kind].errors[way] for way in WAYS), str(found[kind].order)) for kind in kinds)
-    weights = "; ".join(f"{TOLD[kind]}: " + ", ".join(f"{v:.1e}" for v in found[kind].weights.V_1) for kind in kinds)
-    table = Table(("noise (84) read as", *WAYS, "order"), rows, (
-        f"RMSE in N m from 1 s on, mean of {seeds} seeds ({smoothed} for the smoother). Tuned on {TUNED} other seeds: the PI observer and the "
-        "two walks by their RMSE, the likelier order by likelihood on one record. “no noise” runs what is tuned for dt w. "
-        f"Best V_1: {weights}."
+    rows: tuple[tuple[str | float, ...], ...] = tuple(
+        (TOLD[kind], *(c.errors[way] for way in WAYS), c.model, ", ".join(f"{v:.1e}" for v in c.weights.V_1))
+        for kind, c in found.items()
+    )
+    table = Table(("noise (84) read as", *WAYS, "likelier", "best V_1"), rows, (
+        f"RMSE in N m from 1 s on, mean of {seeds} seeds ({smoothed} for the smoother). Tuned on {TUNED} other seeds: the PI "
+        "observer and the two walks by their RMSE, the next by likelihood on one record. “No noise” runs what is tuned for dt w. "
+        "The drivers are those of the rig, on the paper's wheel."
     ))  # fmt: skip
     words = (
-        "The paper compares its PI observer with nothing. Kalman filters whose torque is a random walk, or an integrated one, get "
-        "the same angles and the same known torque.",
+        "The paper compares its PI observer with nothing. Kalman filters whose torque is a random walk, or an integrated one, "
+        "get the same angles and the same known torque.",
     )
     return Chapter(
         "Kalman filters and smoothers beside the PI observer", words, (table, _chart(found["derivative"])), tuple(items)
@@ -236,10 +256,11 @@ def filters_chapter(seeds: int, smoothed: int, kinds: Sequence[str] = KINDS) -> 
 def _by_likelihood(c: Compared, kind: str) -> Item:
     e, best = c.errors, min(c.errors[way] for way in WAYS[2:4])
     return Item(
-        f"{TOLD[kind]}: the order is chosen by likelihood on the record", None, f"order {c.order}: {e[WAYS[4]]:.3f} N m", "",
+        f"{TOLD[kind]}: what walks is chosen by likelihood on the record", None, f"{c.model}: {e[WAYS[4]]:.3f} N m", "",
         e[WAYS[4]] <= 1.1 * best,
-        f"not in the paper; random walk {e[WAYS[2]]:.3f}, integrated {e[WAYS[3]]:.3f}, best PI {e[WAYS[1]]:.3f}, paper's PI {e[WAYS[0]]:.3f}, "
-        f"smoother {e[WAYS[5]]:.3f} N m. Sinusoids flatter the integrated walk; within 10 % of the better order counts",
+        f"not in the paper; random walk {e[WAYS[2]]:.3f}, integrated {e[WAYS[3]]:.3f}, best PI {e[WAYS[1]]:.3f}, paper's PI "
+        f"{e[WAYS[0]]:.3f}, smoother {e[WAYS[5]]:.3f} N m. Sinusoids flatter the integrated walk; within 10 % of the better "
+        "counts",
     )  # fmt: skip
 
 

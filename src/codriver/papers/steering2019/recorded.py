@@ -56,7 +56,11 @@ def recorded_chapters(recordings: Path | None, tell: Tell) -> tuple[Chapter, ...
     for title, path, make in made:
         if not path.exists():
             name = path.relative_to(recordings)
-            chapters.append(Chapter(title, (f"The recording {name} is not there; give the folder that holds it with --recordings.",), ()))
+            chapters.append(
+                Chapter(
+                    title, (f"The recording {name} is not there; give the folder that holds it with --recordings.",), ()
+                )
+            )
             continue
         tell(f"reading {path.parent.name if path.is_file() else path.name}")
         try:
@@ -74,10 +78,16 @@ def shaft_chapter(path: Path) -> Chapter:
     (_, _, _, full), by_brush = brush(s, fitted)
     ways = {
         "eq. (92)": by_slip, "eq. (92) for a brush tyre": by_brush, "angle alone": regression(s, fitted, s.angle),
-        "lateral acceleration alone": regression(s, fitted, s.lateral), "angle and lateral acceleration": regression(s, fitted, s.angle, s.lateral),
+        "lateral acceleration alone": regression(s, fitted, s.lateral), "angle and lateral acceleration": regression(s, fitted,
+        s.angle, s.lateral),
     }  # fmt: skip
     rows = tuple(
-        (name, explained(s.torque[fitted], T[fitted]), explained(s.torque[judged], T[judged]), float(np.sqrt(np.mean((T - s.torque)[judged] ** 2))))
+        (
+            name,
+            explained(s.torque[fitted], T[fitted]),
+            explained(s.torque[judged], T[judged]),
+            float(np.sqrt(np.mean((T - s.torque)[judged] ** 2))),
+        )
         for name, T in ways.items()
     )
     r2 = explained(s.torque[judged], by_slip[judged])
@@ -85,21 +95,24 @@ def shaft_chapter(path: Path) -> Chapter:
     sliding = [explained(s.torque[slide], way(s, before)[1][slide]) for way in (linear, brush)]
     items = (
         Item("(92): K_aln is negative", "-K_p C_f n_t", float(K), "N m/rad", bool(K < 0),
-             f"by least squares, with l_f = {front:.2f} m and g_s = {ratio:.1f} found along with it: the tyres turn the wheel back"),
-        Item("(92): the alignment torque is proportional to the front slip angle", "K_aln constant", f"R² {r2:.2f} on corners not fitted", "",
+             f"by least squares, with l_f = {front:.2f} m and g_s = {ratio:.1f} found with it: the tyres turn the wheel back"),
+        Item("(92): the alignment torque is proportional to the front slip angle", "K_aln constant", f"R² {r2:.2f} on corners not "
+             "fitted", "",
              r2 > 0.8, f"above 0.8 counts. Angle alone: {rows[2][2]:.2f}. Where the tyres slide (fitted up to {SLIDE[0]:g} s, "
-             f"judged to {SLIDE[1]:g}): R² {sliding[0]:.2f}, a brush tyre that slides from {np.degrees(full):.1f} degrees on {sliding[1]:.2f}"),
+             f"judged to {SLIDE[1]:g}): R² {sliding[0]:.2f}, a brush tyre that slides from {np.degrees(full):.1f} degrees on "
+             f"{sliding[1]:.2f}"),
     )  # fmt: skip
     return Chapter(SHAFT_TITLE, (
-        "The recorded lap of a commercial simulator has shaft torque, sideslip and yaw rate: all of (92). Fitted up to 38 s, before the quick "
-        "corners, judged from there to 47 s, before a slide.",
+        "The recorded lap of a commercial simulator has shaft torque, sideslip and yaw rate: all of (92). Fitted up to 38 s, "
+        "before the quick corners, judged from there to 47 s, before a slide.",
     ), (Table(("way", "R² fitted", "R² judged", "RMSE judged, N m"), rows), _shaft_chart(s, by_slip, by_brush)), items)  # fmt: skip
 
 
 def _shaft_chart(s: Shaft, by_slip: np.ndarray, by_brush: np.ndarray) -> Chart:
     part = s.time < LAP[1]
     return Chart("Shaft torque", "time (s)", (Plot("torque (N m)", (
-        Curve("recorded", s.time[part], s.torque[part], BLACK, width=1.0), Curve("eq. (92)", s.time[part], by_slip[part], "#C84C00"),
+        Curve("recorded", s.time[part], s.torque[part], BLACK, width=1.0), Curve("eq. (92)", s.time[part], by_slip[part],
+        "#C84C00"),
         Curve("brush tyre", s.time[part], by_brush[part], "#0072B2"),
     ), 220, (0.0,)),), f"Fitted up to {LAP[0]:g} s.")  # fmt: skip
 
@@ -114,7 +127,9 @@ def toyota_chapter(folder: Path) -> Chapter:
     p = hands_by(torque, spread, correlation_time(torque[fitted]))
     other = car.span(13.0, 35.0)
     again = car.estimate(car.span(35.0, 59.0))
-    q = hands_by(again, float(np.sqrt(np.mean(again[car.span(35.0, 59.0)] ** 2))), correlation_time(again[car.span(35.0, 59.0)]))
+    q = hands_by(
+        again, float(np.sqrt(np.mean(again[car.span(35.0, 59.0)] ** 2))), correlation_time(again[car.span(35.0, 59.0)])
+    )
     follows = float(np.corrcoef(torque[on], car.sensor[on])[0, 1])
     tells, tells_again = p[on].mean() - p[judged].mean(), q[on].mean() - q[other].mean()
     items = (
@@ -122,8 +137,8 @@ def toyota_chapter(folder: Path) -> Chapter:
              "not in the paper; correlation, the sensor is not used. Above 0.5 counts"),
         Item("hands on is told from hands off", None,
              f"probability {p[on].mean():.2f} with hands, {p[judged].mean():.2f} without", "", bool(min(tells, tells_again) > 0.3),
-             f"not in the paper; fitted on the other part of the minute {q[on].mean():.2f} and {q[other].mean():.2f}. 0.3 apart in both counts: one "
-             "minute on a nearly straight road is too little to identify a column"),
+             f"not in the paper; fitted on the other part of the minute {q[on].mean():.2f} and {q[other].mean():.2f}. 0.3 apart "
+             "in both counts: one minute on a nearly straight road is too little to identify a column"),
     )  # fmt: skip
     step = slice(None, None, 5)
     chart = Chart(

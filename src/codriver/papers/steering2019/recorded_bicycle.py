@@ -1,7 +1,7 @@
 """Beside 2019 section 4: the torque on a handlebar, known on two recorded bicycles, by the second row of the bicycle's equations.
 
-TU Delft's riderless steer-by-wire bicycle: two runs to fit, three to judge. UC Davis' instrumented bicycle with a rider: each half of a
-ride judged by what was learnt from the other. Coefficients, ways and limits: docs/bicycle.md.
+TU Delft's riderless steer-by-wire bicycle: two runs to fit, three to judge. UC Davis' instrumented bicycle with a rider: each
+half of a ride judged by what was learnt from the other. Coefficients, ways and limits: docs/bicycle.md.
 """
 
 from __future__ import annotations
@@ -73,7 +73,9 @@ def delft_chapter(folder: Path) -> Chapter:
     for run, file in RUNS.items():
         log = read(folder / f"{file}.log", names=NAMES[DELFT])
         records[run] = steer_record(log.between(0.0, FALLS) if run == "1.2 Hz" else log, 0.01)
-    rows, least, simple = judge([records[run] for run in LEARNT], {run: r for run, r in records.items() if run not in LEARNT}, GIVEN[DELFT])
+    rows, least, simple = judge(
+        [records[run] for run in LEARNT], {run: r for run, r in records.items() if run not in LEARNT}, GIVEN[DELFT]
+    )
     return _chapter(
         "A riderless bicycle, steered by wire: TU Delft", rows, least, simple,
         "The motor's command is the torque. Fitted on two runs, judged on three others, one of them at another speed.",
@@ -83,7 +85,10 @@ def delft_chapter(folder: Path) -> Chapter:
 def davis_chapter(folder: Path) -> Chapter:
     """Each half of the ride by the other."""
     log = read(folder / "run-283-first-60s.csv", names=NAMES[DAVIS])
-    halves = {"first half": steer_record(log.between(0, 30), 0.005), "second half": steer_record(log.between(30, 60), 0.005)}
+    halves = {
+        "first half": steer_record(log.between(0, 30), 0.005),
+        "second half": steer_record(log.between(30, 60), 0.005),
+    }
     found = [
         judge([halves[other]], {name: halves[name]}, GIVEN[DAVIS])
         for name, other in (("first half", "second half"), ("second half", "first half"))
@@ -91,7 +96,8 @@ def davis_chapter(folder: Path) -> Chapter:
     rows = [row for part, _, _ in found for row in part]
     return _chapter(
         "A bicycle with a rider: UC Davis", rows, min(least for _, least, _ in found), min(simple for _, _, simple in found),
-        "A sensor in the steering column measures the rider's torque. Each half of a ride of 60 s is judged by what was learnt from the other.",
+        "A sensor in the steering column measures the rider's torque. Each half of a ride of 60 s is judged by what was learnt "
+        "from the other.",
     )  # fmt: skip
 
 
@@ -116,9 +122,10 @@ def judge(
 
 def _chapter(title: str, rows: list[tuple[str | float, ...]], least: float, simple: float, words: str) -> Chapter:
     items = (
-        Item("the torque by the bicycle's steer row, on what it was not fitted to", None, f"R² {least:.2f} at least", "", least > simple,
-             f"not in the paper; worst run. A regression on angle, rate and friction: {simple:.2f} at least. Low-passed at 5 Hz both ways, so "
-             "with hindsight; what is left of it while it happens is in docs/bicycle.md"),
+        Item("the torque by the bicycle's steer row, on what it was not fitted to", None, f"R² {least:.2f} at least", "",
+             least > simple,
+             f"not in the paper; worst run. A regression on angle, rate and friction: {simple:.2f} at least. Low-passed at 5 Hz "
+             "both ways, so with hindsight; what is left of it while it happens is in docs/bicycle.md"),
     )  # fmt: skip
     head = ("judged on", "steer row: RMSE, N m", "R²", "regression: RMSE, N m", "R²", "answering zero: RMSE, N m")
     return Chapter(title, (words,), (Table(head, tuple(rows)),), items)

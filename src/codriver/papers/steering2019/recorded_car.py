@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from codriver.errors import LogError
 from codriver.identify import identify_alignment
 from codriver.identify.alignment_drive import alignment_drive
 from codriver.identify.alignment_holdout import features, regression
@@ -74,6 +75,9 @@ def other_drive(folder: Path) -> OtherDrive:
 
     Args:
         folder: that holds the recordings.
+
+    Raises:
+        LogError: a drive is not what it should be.
     """
     logs: dict[str, Log] = {name: read(folder / file, names=NAMES) for name, file in FILES.items()}
     fit = identify_alignment([logs[name] for name in LEARNT])
@@ -85,10 +89,13 @@ def other_drive(folder: Path) -> OtherDrive:
     y, left = drive.torque[drive.keep], (drive.torque - answer)[drive.keep]
     middle = np.concatenate([d.torque[d.keep] for d in fit.drives]).mean()
     filtered, smoothed = compare_with_sensor(estimate), compare_with_sensor(hindsight)
-    assert filtered is not None and smoothed is not None
+    if filtered is None or smoothed is None:
+        raise LogError(
+            f"{JUDGED} has no usable torque", "the sensor's torque along the drive", "give the whole recording"
+        )
     return OtherDrive(
         filtered, smoothed, (float(np.sqrt(np.mean(left**2))), float(1 - np.mean(left**2) / np.var(y))),
-        float(np.sqrt(np.mean((y - middle) ** 2))), estimate.time, on_ticks(estimate, "steering_wheel_torque"),
+        float(np.sqrt(np.mean((y - middle) ** 2))), estimate.time - estimate.time[0], on_ticks(estimate, "steering_wheel_torque"),
         estimate.columns["driver_torque"], hindsight.columns["driver_torque"][: len(estimate.grid)],
         estimate.columns["steering_wheel_angle"],
     )  # fmt: skip
@@ -98,13 +105,15 @@ def car_chapter(folder: Path) -> Chapter:
     """The drive kept back."""
     o = other_drive(folder)
     items = (
-        Item("the torque on a drive that nothing was fitted to, against a regression of nine features", None, o.filtered.rmse, "N m",
+        Item("the torque on a drive that nothing was fitted to, against a regression of nine features", None, o.filtered.rmse,
+             "N m",
              o.filtered.rmse <= o.regression[0] and o.filtered.r2 >= o.regression[1],
-             f"not in the paper. R² {o.filtered.r2:.2f}; the regression, fitted on the same drives: RMSE {o.regression[0]:.3f} N m, R² "
-             f"{o.regression[1]:.2f}; answering the mean: {o.mean:.3f} N m. At least as good counts"),
+             f"not in the paper. R² {o.filtered.r2:.2f}; the regression, fitted on the same drives: RMSE {o.regression[0]:.3f} N "
+             f"m, R² {o.regression[1]:.2f}; answering the mean: {o.mean:.3f} N m. At least as good counts"),
         Item("95 % of the sensor's torques are in the 95 % band", None, f"{o.filtered.covered or 0:.0%}", "",
              0.85 <= (o.filtered.covered or 0) <= 0.99,
-             "not in the paper; 85 to 99 % counts. The band is mostly what the map erred by when one of the two drives was left out"),
+             "not in the paper; 85 to 99 % counts. The band is mostly what the map erred by when one of the two drives was left "
+             "out"),
     )  # fmt: skip
     rows = (
         ("driver-torque-car", o.filtered.rmse, o.filtered.r2, o.filtered.bias, o.filtered.correlation),
@@ -113,19 +122,22 @@ def car_chapter(folder: Path) -> Chapter:
         ("the mean of the two drives", o.mean, None, None, None),
     )
     table = Table(("way", "RMSE, N m", "R²", "mean error, N m", "correlation"), rows,
-                  f"Identified on {' and '.join(LEARNT)}, judged on {JUDGED}: straight roads and slow traffic, the hard one of the three.")  # fmt: skip
+                  f"Identified on {' and '.join(LEARNT)}, judged on {JUDGED}: straight roads and slow traffic, the hard one of "
+                  "the three.")  # fmt: skip
     part, step = np.flatnonzero(np.isfinite(o.truth)), 5
     part = part[::step]
     chart = Chart(
         f"{JUDGED}: estimated and measured torque", "time (s)",
         (
             Plot("torque (N m)", (
-                Curve("measured", o.time[part], o.truth[part], BLACK, width=1.0), Curve("estimated", o.time[part], o.torque[part], "#C84C00"),
+                Curve("measured", o.time[part], o.truth[part], BLACK, width=1.0), Curve("estimated", o.time[part], o.torque[part],
+                "#C84C00"),
             ), 240, (0.0,)),
             Plot("angle (deg)", (Curve("wheel", o.time[part], o.angle[part] / DEGREE, "#757575"),), 120),
         ), "Angle and speed alone; the sensor is not used on this drive.",
     )  # fmt: skip
     return Chapter(TITLE, (
-        "No force feedback and no simulator here: the torque on the column is a map of angle and speed (docs/alignment.md), found on two other "
-        "drives. The idea of one of its parts, the bank of the road, came from looking at the drive judged here, which flatters.",
+        "No force feedback and no simulator here: the torque on the column is a map of angle and speed (docs/alignment.md), "
+        "found on two other drives. The idea of one of its parts, the bank of the road, came from looking at the drive judged "
+        "here, which flatters.",
     ), (table, chart), items)  # fmt: skip

@@ -54,7 +54,9 @@ def robustness_chapter(seeds: int) -> Chapter:
         for name, weights in (("right", right), ("n_x", n_2), ("swapped", swapped))
     }
     count, matched = preset.measured.shape[0], lost["Q as the noise is (1e-4)"]
-    ekf, ukf = (sum(row[f] for name, row in lost.items() if "bounded" not in name and "ln" not in name) for f in ("EKF", "UKF"))
+    ekf, ukf = (
+        sum(row[f] for name, row in lost.items() if "bounded" not in name and "ln" not in name) for f in ("EKF", "UKF")
+    )
     restarted = [
         algorithm_1(on_grid(white.time, {ANGLE: y, MOTOR: white.torque}), replace(PAPER, process=MATCHED))
         for y in white.measured
@@ -63,8 +65,8 @@ def robustness_chapter(seeds: int) -> Chapter:
         Item("4.1: the joint EKF is more robust to the parameter settings", "more robust",
              f"with Q as the noise is, EKF loses {matched['EKF']}, UKF {matched['UKF']} of {seeds}", "",
              matched["EKF"] < matched["UKF"] and ekf < ukf,
-             f"over all settings of the table that leave J_s free: EKF {ekf}, UKF {ukf}. The EKF's J_s passes 0, where the model has a "
-             f"pole. The UKF is sensitive to alpha: with 1 in place of 1e-3 it loses {matched['UKF, alpha = 1']}"),
+             f"over all settings of the table that leave J_s free: EKF {ekf}, UKF {ukf}. The EKF's J_s passes 0, where the model "
+             f"has a pole. The UKF is sensitive to alpha: with 1 in place of 1e-3 it loses {matched['UKF, alpha = 1']}"),
         Item("4.1: a remedy for both", None,
              f"EKF {lost[SETTINGS[-1][0]]['EKF']}, UKF {lost[SETTINGS[-1][0]]['UKF']} of {seeds} lost", "",
              lost[SETTINGS[-1][0]]["EKF"] == lost[SETTINGS[-1][0]]["UKF"] == 0,
@@ -72,7 +74,7 @@ def robustness_chapter(seeds: int) -> Chapter:
         Item("algorithm 1: change the guess and restart until it converges", "converges",
              f"{sum(p.converged for p in restarted)} of {seeds} converge", "",
              all(p.converged and _right(p) for p in restarted),
-             f"EKF with Q as the noise is, restarted by a ladder of guesses; none may end on a wrong wheel. "
+             "EKF with Q as the noise is, restarted by a ladder of guesses; none may end on a wrong wheel. "
              f"{sum(len(p.passes) > 1 for p in restarted)} needed a second pass"),
         Item("(64)-(65): W_c and W_m", "W_m has 1 - alpha² + beta, W_c has not",
              f"as printed {printed['swapped']} of {count} runs are lost, the other way round {printed['right']}", "",
@@ -84,8 +86,8 @@ def robustness_chapter(seeds: int) -> Chapter:
         *_remark_4(preset),
     )  # fmt: skip
     words = (
-        "Runs lost of each filter where the noise is white with 0.01 dt a tick and a setting is not the paper's. A run is lost that ends "
-        "further than half of the truth from it.",
+        "Runs lost of each filter where the noise is white with 0.01 dt a tick and a setting is not the paper's. A run is lost "
+        "that ends further than half of the truth from it.",
     )
     return Chapter("Robustness, misprints, remark 4 (3.2, 3.3, 4.1)", words, (_table(lost, seeds),), items)
 
@@ -94,9 +96,11 @@ def _remark_4(preset: WheelRuns) -> tuple[Item, ...]:
     entries, moved = _jacobian_81(), _dual_ekf(preset)
     steps = _recurrent()
     return (
-        Item("remark 4: a dual EKF cannot identify the wheel", "H_p = 0", f"J_s and b_s move by {moved:.1g} in 15 s", "", moved == 0.0,
+        Item("remark 4: a dual EKF cannot identify the wheel", "H_p = 0", f"J_s and b_s move by {moved:.1g} in 15 s", "",
+             moved == 0.0,
              "the angle after one Euler step (77) does not depend on J_s and b_s, so the measurement teaches nothing"),
-        Item("remark 4: nor can any dual filter", "cannot update the parameters", f"after two steps H_p = {steps[0]:.2g} rad/(kg m²), {steps[1]:.2g} rad/(N m s/rad)", "",
+        Item("remark 4: nor can any dual filter", "cannot update the parameters", f"after two steps H_p = {steps[0]:.2g} rad/(kg "
+             f"m²), {steps[1]:.2g} rad/(N m s/rad)", "",
              not all(abs(s) > 1e-6 for s in steps),
              "that holds for the one-step Jacobian alone; the derivative of the filter's state by the parameters, carried along "
              "(a recurrent dual EKF), is not 0 from the second step on"),
@@ -141,11 +145,14 @@ def _jacobian_81() -> tuple[float, float]:
 def _dual_ekf(runs: WheelRuns) -> float:
     """How far J_s and b_s move in a dual EKF with the one-step Jacobian of (81)."""
     jacobian = joint_functions(DT, False)[1]
-    p, P, x, S = np.array(HALF), np.diag([8e-3, 0.1]), np.zeros(2), np.eye(2)
+    p: Array = np.array(HALF)
+    P, x, S = np.diag([8e-3, 0.1]), np.zeros(2), np.eye(2)
     for k in range(1, runs.time.size):
         whole = np.array(jacobian(np.r_[x, p], runs.torque[k - 1]))
         A, H_p = whole[:2, :2], whole[:1, 2:]
-        x = np.array(tick_of(*p, DT, "euler").advance(*x, runs.torque[k - 1]))
+        x = np.array(
+            tick_of(float(p[0]), float(p[1]), DT, "euler").advance(float(x[0]), float(x[1]), runs.torque[k - 1])
+        )
         S = A @ S @ A.T + 0.01 * np.eye(2)
         e, s = runs.measured[0, k] - x[0], S[0, 0] + PAPER.angle
         p, P = p + (P @ H_p.T)[:, 0] / float((H_p @ P @ H_p.T)[0, 0] + s) * e, P + 5e-8 * np.eye(2)

@@ -28,8 +28,7 @@ DT = 0.01  # s
 DEGREE = pi / 180
 ANGLE, ALIGNMENT, MOTOR = "steering_wheel_angle", "alignment_torque", "steering_motor_torque"
 WORDS = {
-    "step": "0.01 a step", "continuous": "0.01 dt a step (white noise of the continuous model)",
-    "derivative": "dt w, added to the derivative", "none": "no noise",
+    "step": "0.01 a step", "continuous": "0.01 dt a step", "derivative": "dt w", "none": "no noise",
 }  # fmt: skip
 QUIET = WheelNoise(process=0.0, angle=0.0)
 

@@ -84,7 +84,10 @@ def visit_lab(friction: float = FRICTION, seconds: float = 180.0) -> Lab:
         weights = identify_torque_scale(command, mass, source="weighings of the rig")
         chirp, log = (read(path, names=files.names) for path in (files.chirp, files.drive))
         chirp, log = (Log.of(list(made.values()), source=made.source) for made in (chirp, log))
-    time, torque = chirp["steering_motor_command"].time, weights.scale * chirp["steering_motor_command"].values + weights.offset
+    time, torque = (
+        chirp["steering_motor_command"].time,
+        weights.scale * chirp["steering_motor_command"].values + weights.offset,
+    )
     grid = _nearest(chirp, time, torque)
     settings = JointSettings((J_S, B_S), dt=TICK)
     passes = {way: algorithm_1(grid, settings, make) for way, make in MAKERS.items()}
@@ -112,8 +115,8 @@ def simulator_chapter(lab: Lab, smooth: Lab) -> Chapter:
     """
     items = (*_weights(lab), *_chirp(lab, smooth), *_sign())
     words = (
-        "No recording of the paper's simulator is public. A simulated rig stands in: the wheel of (90) is the true one here, so these "
-        "figures say whether the method finds a wheel, not which wheel the authors had. Every step goes through the files "
+        "No recording of the paper's simulator is public. A simulated rig stands in: the wheel of (90) is the true one here, so "
+        "these figures say whether the method finds a wheel, not which wheel the authors had. Every step goes through the files "
         "that a simulator would write, in degrees and in the motor's own unit.",
     )
     return Chapter(
@@ -125,7 +128,8 @@ def simulator_chapter(lab: Lab, smooth: Lab) -> Chapter:
 def _weights(lab: Lab) -> tuple[Item, ...]:
     w = lab.weights
     return (
-        near("(89): torque per command", SCALE, w.scale, "N m", 0.02, f"12 simulated weighings with friction; standard error {w.sd_scale:.4f}"),
+        near("(89): torque per command", SCALE, w.scale, "N m", 0.02, "12 simulated weighings with friction; standard error "
+        f"{w.sd_scale:.4f}"),
         Item("(89): torque at command 0", OFFSET, w.offset, "N m", abs(w.offset - OFFSET) <= 3 * w.sd_offset,
              f"standard error {w.sd_offset:.4f}; three of them count"),
     )  # fmt: skip
@@ -139,8 +143,8 @@ def _chirp(lab: Lab, smooth: Lab) -> tuple[Item, ...]:
             items.append(Item(
                 f"({90 + list(MAKERS).index(way)}): {letter} by {way}, a wheel without friction", PRINTED[way][i], found, unit,
                 abs(found / WHEEL[i] - 1) <= 0.05,
-                f"{found / WHEEL[i] - 1:+.1%} from the true {WHEEL[i]}; within 5 % counts; Q_z of (85), Euler's steps of 20 ms. With {FRICTION} N m of friction in the wheel: "
-                f"{rubbed:.4f}, {rubbed / WHEEL[i] - 1:+.1%}",
+                f"{found / WHEEL[i] - 1:+.1%} from the true {WHEEL[i]}; within 5 % counts; Q_z of (85), Euler's steps of 20 ms. "
+                f"With {FRICTION} N m of friction in the wheel: {rubbed:.4f}, {rubbed / WHEEL[i] - 1:+.1%}",
             ))  # fmt: skip
     off = max(abs(lab.passes[way].values[1] / WHEEL[1] - 1) for way in MAKERS)
     c = lab.fit.coefficients
@@ -148,8 +152,10 @@ def _chirp(lab: Lab, smooth: Lab) -> tuple[Item, ...]:
     friction = c["T_c"].value if "T_c" in c else 0.0
     return (
         *items,
-        Item("4.2: J_s and b_s describe a gaming wheel", "no friction in (27)", f"b_s is {off:.0%} too large with friction of {FRICTION} N m", "",
-             off <= 0.05, "friction that the model leaves out goes into b_s; within 5 % counts. The paper does not look for friction"),
+        Item("4.2: J_s and b_s describe a gaming wheel", "no friction in (27)", f"b_s is {off:.0%} too large with friction of "
+             f"{FRICTION} N m", "",
+             off <= 0.05, "friction that the model leaves out goes into b_s; within 5 % counts. The paper does not look for "
+             "friction"),
         Item("the default identification on the same recording, friction and all", None,
              f"J_s {c['J_s'].value:.4f}, b_s {c['b_s'].value:.4f}, T_c {friction:.3f} N m", "", fit_off <= 0.02,
              f"not in the paper; at most {fit_off:.2%} from the truth, 2 % counts"),
@@ -161,8 +167,9 @@ def _sign() -> tuple[Item, ...]:
     back, away = (float(np.linalg.eigvals(coupled(car, sign)).real.max()) for sign in (1.0, -1.0))
     return (
         Item("(92): K_aln = -K_p C_f n_t, which is negative", "negative", "positive turns the wheel back", "", away <= 0,
-             f"angle, sideslip and yaw rate positive to one side. A wheel let go of at 50 km/h, single track and column of the rig: with a negative "
-             f"K_aln it runs away with {away:.2f} 1/s, with a positive one it comes back with {-back:.2f} 1/s or quicker"),
+             "angle, sideslip and yaw rate positive to one side. A wheel let go of at 50 km/h, single track and column of the "
+             f"rig: with a negative K_aln it runs away with {away:.2f} 1/s, with a positive one it comes back with {-back:.2f} "
+             "1/s or quicker"),
     )  # fmt: skip
 
 
@@ -190,22 +197,27 @@ def _weights_chart(lab: Lab) -> Chart:
 
 
 def _table(lab: Lab, smooth: Lab) -> Table:
-    rows: list[tuple[str | float | None, ...]] = [("true", *WHEEL, "0 or 0.15", "")]
+    rows: list[tuple[str, ...]] = [("true", *_told(WHEEL), f"0 or {FRICTION}", "")]
     for words, where in (("no friction", smooth), (f"friction {FRICTION} N m", lab)):
         for way, passes in where.passes.items():
             last = passes.passes[-1]
-            rows.append((f"{way}, {words}", *passes.values, "not in the model", last.why_not or "converged"))
+            rows.append((f"{way}, {words}", *_told(passes.values), "not in the model", last.why_not or "converged"))
         c = where.fit.coefficients
         friction = f"{c['T_c'].value:.3f}" if "T_c" in c else "none found"
-        rows.append((f"prediction errors, {words}", c["J_s"].value, c["b_s"].value, friction, ""))
-    rows += [(f"the paper, {way}", *PRINTED[way], "", "") for way in MAKERS]
+        rows.append((f"prediction errors, {words}", *_told((c["J_s"].value, c["b_s"].value)), friction, ""))
+    rows += [(f"the paper, {way}", *_told(PRINTED[way]), "", "") for way in MAKERS]
     return Table(("way", "J_s, kg m²", "b_s, N m s/rad", "T_c, N m", "algorithm 1"), tuple(rows),
                  "Chirp of 2 N m, 0.3 to 4 Hz, 40 s; joint filters at 50 Hz from (0.0672, 0.3562) as in the paper.")  # fmt: skip
 
 
+def _told(values: tuple[float, float]) -> tuple[str, str]:
+    """J_s and b_s to the paper's digits."""
+    return f"{values[0]:.4f}", f"{values[1]:.4f}"
+
+
 def _figure(way: str, lab: Lab) -> Chart:
     last = lab.passes[way].passes[-1]
-    time = np.arange(last.path.shape[0]) * TICK
+    time = np.arange(last.path.shape[0], dtype=np.float64) * TICK
     plots = []
     for i, label in enumerate(("J_s (kg m²)", "b_s (N m s/rad)")):
         value, sd = last.path[:, i], last.path_sd[:, i]
