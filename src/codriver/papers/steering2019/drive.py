@@ -226,8 +226,8 @@ def _figure_10(found: dict[str, Told]) -> Chart:
     return Chart(
         "Figure 10: the angle from the estimated torque alone", "time (s)",
         (Plot("angle (deg)", (*curves, measured), 280, (0.0,)),),
-        "The wheel (28) turned by the estimate and the alignment torque from the first angle on, never corrected. EKF and UKF lie on "
-        "one another, and so do smoother and measurement.",
+        "The wheel (28) turned by the estimate and the alignment torque from the first angle on, never corrected. EKF and UKF lie "
+        "on one another, and so do smoother and measurement.",
     )  # fmt: skip
 
 
