@@ -18,6 +18,7 @@ from codriver.observers.registry import ESTIMATORS
 from codriver.observers.torque_noise import TORQUE_NOISES, TorqueNoise, find_torque_noise, save_torque_noise
 from codriver.offline import smooth
 from codriver.run import estimate_log
+from codriver.simulate.hands import HandsDrives, HandsSetting, simulate_hands
 from codriver.simulate.rig import RigDrive, RigSetting, simulate_rig
 from codriver.simulate.steering import Wheel
 from codriver.testing import check_observer
@@ -366,6 +367,56 @@ class TestAgainstTheLog:
         assert good.rmse < 0.01
         # A constant 0.1 N m makes 0.1 / b_s rad/s: over 10 s, a mean square of (0.28 * 10)^2 / 3.
         assert bad.rmse == pytest.approx(0.1 / 0.3515 * 10 / np.sqrt(3), rel=0.15)
+
+
+class TestAssist:
+    """A car that keeps its lane by a motor whose torque the log holds: the map from drives without hands, then hands on and off."""
+
+    @pytest.fixture(scope="class")
+    def car(self) -> Vehicle:
+        from codriver.identify import identify_alignment
+
+        empty = HandsSetting(off_dwell=1e9, on_dwell=1e-6, seconds=200.0, curvature=0.003)
+        drives = [self.log(simulate_hands(replace(empty, speed=v), seed=700 + int(v)), v) for v in (15.0, 22.0, 30.0)]
+        return identify_alignment(drives, by="steering_motor_torque").vehicle(name="lane-keeper")
+
+    @staticmethod
+    def log(drive: HandsDrives, speed: float) -> cd.Log:
+        n = drive.time.size
+        return cd.Log.of([
+            drive.log()["steering_wheel_angle"],
+            cd.Signal("steering_motor_torque", drive.time, drive.motor_torque[0], "N*m", "motor"),
+            cd.Signal("longitudinal_speed", drive.time, np.full(n, speed), "m/s", "wheels"),
+        ])  # fmt: skip
+
+    def test_torque_and_hands(self, car):
+        setting = HandsSetting(seconds=300.0)
+        drive = simulate_hands(setting, seed=901)
+        run = estimate_log("driver-torque", self.log(drive, setting.speed), car)
+        assert run.observer == "driver-torque-assist"
+        n = len(run.grid)
+        e = run.columns["driver_torque"] - drive.driver_torque[0][:n]
+        assert rms(e) < 0.4 * drive.driver_torque[0].std()
+        on = drive.hands_on[0][:n] > 0.5
+        p = run.columns["hands_on"]
+        assert p[on].mean() > p[~on].mean() + 0.3
+
+    def test_a_map_is_for_one_of_the_two(self, car):
+        """The whole load without the motor's torque would be a wrong number; so would a map less assist with it."""
+        from codriver.observers import feeds
+
+        setting = HandsSetting(seconds=20.0)
+        log = self.log(simulate_hands(setting, seed=902), setting.speed)
+        without = cd.Log.of([log["steering_wheel_angle"], log["longitudinal_speed"]])
+        with pytest.raises(MissingSignal, match="no alignment_whole"):
+            estimate_log("driver-torque", without, car)
+        with pytest.raises(VehicleError, match="not for a vehicle with alignment_whole"):
+            cd.build("driver-torque-car", car)
+        felt = Vehicle("felt", "felt", "test", {}).with_parameter("alignment_gain", 1.0)
+        possible = [f.estimator for f in feeds(log, felt, "driver-torque") if f.possible]
+        assert possible == ["driver-torque-car"]
+        check_observer(cd.build("driver-torque-assist", car))
+        check_observer(cd.build("driver-torque-car", felt))
 
 
 def test_the_family_in_its_order():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as json_module
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
@@ -11,10 +11,21 @@ from codriver.cli.identify import Logs, Out, Overwrite, Report, _check_outputs, 
 from codriver.cli.identify_steering import Old, _say, _write, app
 from codriver.cli.options import Bus, Dbc, Json, Names
 
+TORQUE = "steering_wheel_torque"
+Torque = Annotated[
+    str,
+    typer.Option(
+        "--torque",
+        metavar="NAME",
+        help="Standard name of the torque that turns the wheel: of a sensor, or steering_motor_torque of drives without hands.",
+    ),
+]
+
 
 @app.command("alignment")
 def alignment(
-    logs: Logs, out: Out, dbc: Dbc = None, names: Names = None, bus: Bus = None, vehicle: Old = None, report: Report = None,
+    logs: Logs, out: Out, dbc: Dbc = None, names: Names = None, bus: Bus = None, vehicle: Old = None, torque: Torque = TORQUE,
+    report: Report = None,
     overwrite: Overwrite = False, json: Json = False,
 ) -> None:  # fmt: skip
     """The torque of tyres, road and friction on the column, by angle and speed, from drives with a torque sensor (2019, eq. 92).
@@ -36,7 +47,7 @@ def alignment(
         stage("reading " + ", ".join(path.name for path in logs))
         recorded = [read(path, dbc=dbc, names=names, bus=bus) for path in logs]
         stage("identifying")
-        fit = identify_alignment(recorded, old)
+        fit = identify_alignment(recorded, old, by=torque)
     _write(fit.vehicle(old, out.stem), alignment_document(fit, old, command_line()), out, report, overwrite)
     held = [] if fit.held.whole is None else [*fit.held.parts, fit.held.whole]
     told: dict[str, Any] = {

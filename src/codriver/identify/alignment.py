@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from codriver.errors import LogError
+from codriver.errors import LogError, UsageError
 from codriver.finding import Finding
-from codriver.identify.alignment_drive import TURNS, Drive, alignment_drive, refuse_sign
-from codriver.identify.alignment_fit import LETTERS, fit_told, modelled
+from codriver.identify.alignment_drive import MOTOR, TORQUE, TORQUES, TURNS, Drive, alignment_drive, refuse_sign
+from codriver.identify.alignment_fit import LETTERS, NO_BEND, WHOLE, fit_told, modelled
 from codriver.identify.alignment_holdout import HoldOut, hold_out
 from codriver.identify.alignment_result import AlignmentFit, coefficients_of
 from codriver.identify.brake_fit import Refusal
@@ -45,35 +45,44 @@ WHY = {
 
 
 def identify_alignment(
-    logs: Sequence[Log], vehicle: Vehicle | None = None, *, rate: float | None = None
+    logs: Sequence[Log], vehicle: Vehicle | None = None, *, rate: float | None = None, by: str = TORQUE
 ) -> AlignmentFit:
     """The map and how far it can be trusted.
 
     Args:
-        logs: drives with steering_wheel_angle, longitudinal_speed and steering_wheel_torque, a person at the wheel.
+        logs: drives with steering_wheel_angle, longitudinal_speed and the torque that turns the wheel.
         vehicle: steering_ratio, wheelbase and characteristic_speed, where it has them.
         rate: ticks per second; by default that of each drive's quicker signal, at most 50.
+        by: that torque. steering_wheel_torque or driver_torque, of a sensor: the map is what hands feel, the assist's share
+            taken off. steering_motor_torque, of drives without hands: the map is the whole load on the column.
 
     Raises:
+        UsageError: no such torque.
         MissingSignal: a signal is missing.
         LogError: a drive is too short, in other units, of the other sign, or goes straight on.
     """
+    if by not in TORQUES:
+        raise UsageError(f"the torque '{by}'", f"one of {', '.join(TORQUES)}", "choose one")
     if not logs:
         raise LogError("no drive", "at least one", "give recordings with a measured torque")
     assumed = {name: USUAL[name] for name in GEOMETRY if vehicle is None or name not in vehicle}
     own: dict[str, Any] = {
         name: vehicle.number(name) if vehicle is not None and name in vehicle else USUAL[name] for name in GEOMETRY
     }
+    whole = by == MOTOR
+    letters = WHOLE if whole else tuple(LETTERS)
+    if whole:
+        own["bend"] = NO_BEND
     start = AlignmentModel(USUAL["alignment_gain"], **own)
-    drives = [alignment_drive(log, start, rate) for log in logs]
+    drives = [alignment_drive(log, start, rate, by) for log in logs]
     source = ", ".join(Path(d.source).name or f"drive {k + 1}" for k, d in enumerate(drives))
     refuse_sign(drives)
     _refuse_straight(drives, source)
-    fit, lost = fit_told([(d, d.keep) for d in drives], start)
+    fit, lost = fit_told([(d, d.keep) for d in drives], start, letters)
     if "k_a" in lost:
         raise LogError(
             f"{source}: torque does not follow the curves", "curves in which the torque rises with lateral acceleration",
-            "check that steering_wheel_torque is the torque of a sensor in the column, and its clock that of the angle",
+            f"check that {by} is the torque that turns the wheel, and its clock that of the angle",
         )  # fmt: skip
     coefficients = coefficients_of(fit)
     for letter, found in coefficients.items():
@@ -81,13 +90,13 @@ def identify_alignment(
     answers = tuple(modelled(d, fit.model) for d in drives)
     left = np.concatenate([(d.torque - a)[d.keep] for d, a in zip(drives, answers, strict=True)])
     measured = np.concatenate([d.torque[d.keep] for d in drives])
-    held, lead = hold_out(drives, start), _lead(drives, answers)
+    held, lead = hold_out(drives, start, letters), _lead(drives, answers)
     refused = tuple(
         Refusal(letter, WHY.get(letter, "the drives are too alike to tell it")) for letter in LETTERS if letter in lost
     )
     return AlignmentFit(
         coefficients, refused, fit.model, held, rms(left), 1 - float(np.mean(left**2) / np.var(measured)), lead, tuple(drives),
-        answers, tuple(_findings(held, lead, refused, assumed)), assumed, source,
+        answers, tuple(_findings(held, lead, refused, assumed)), assumed, source, by,
     )  # fmt: skip
 
 

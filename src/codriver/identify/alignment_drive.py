@@ -21,7 +21,8 @@ from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
 
 ANGLE, SPEED, TORQUE = "steering_wheel_angle", "longitudinal_speed", "steering_wheel_torque"
-SIGNALS = (ANGLE, SPEED, TORQUE)
+MOTOR = "steering_motor_torque"
+TORQUES = (TORQUE, "driver_torque", MOTOR)
 FASTEST_RATE = 50.0  # Hz
 RATE_TIME = 0.06  # s
 SLOWEST = 1.0  # m/s
@@ -72,31 +73,33 @@ class Drive:
         return path
 
 
-def alignment_drive(log: Log, model: AlignmentModel, rate: float | None = None) -> Drive:
+def alignment_drive(log: Log, model: AlignmentModel, rate: float | None = None, by: str = TORQUE) -> Drive:
     """Take a drive.
 
     Args:
-        log: with steering_wheel_angle, longitudinal_speed and steering_wheel_torque.
+        log: with steering_wheel_angle, longitudinal_speed and the torque.
         model: steering ratio, wheelbase and characteristic speed count.
         rate: ticks per second; by default that of the quicker signal, at most FASTEST_RATE.
+        by: standard name of the torque that turns the wheel.
 
     Raises:
         MissingSignal: a signal is missing.
         LogError: the drive is too short, or its angle or speed is in another unit.
     """
     name = log.source or "this log"
-    lacking = [n for n in SIGNALS if n not in log]
+    signals = (ANGLE, SPEED, by)
+    lacking = [n for n in signals if n not in log]
     if lacking:
         raise MissingSignal(
-            f"{name} lacks {', '.join(lacking)}", "the wheel's angle, the speed, and a measured torque in the column",
+            f"{name} lacks {', '.join(lacking)}", "the wheel's angle, the speed, and the torque that turns it",
             "map them in a names file; `codriver info LOG` lists the channels",
         )  # fmt: skip
-    dt = 1.0 / (rate or min(suggest_rate(log, SIGNALS), FASTEST_RATE))
-    start = max(float(log[n].time[0]) for n in SIGNALS)
-    stop = min(float(log[n].time[-1]) for n in SIGNALS)
-    grid = log.sample(SIGNALS, dt, start=start, stop=max(stop, start))
-    angle, speed, torque = (grid.values[n] for n in SIGNALS)
-    keep = np.all([grid.held[n] & np.isfinite(grid.values[n]) for n in SIGNALS], axis=0) & (speed > SLOWEST)
+    dt = 1.0 / (rate or min(suggest_rate(log, signals), FASTEST_RATE))
+    start = max(float(log[n].time[0]) for n in signals)
+    stop = min(float(log[n].time[-1]) for n in signals)
+    grid = log.sample(signals, dt, start=start, stop=max(stop, start))
+    angle, speed, torque = (grid.values[n] for n in signals)
+    keep = np.all([grid.held[n] & np.isfinite(grid.values[n]) for n in signals], axis=0) & (speed > SLOWEST)
     if keep.sum() * dt < LEAST_SECONDS:
         raise LogError(
             f"{name}: {keep.sum() * dt:.0f} s of driving with angle, speed and torque", f"at least {LEAST_SECONDS:g} s",
@@ -121,7 +124,7 @@ def refuse_sign(drives: Sequence[Drive]) -> None:
         if not np.ptp(drive.torque[drive.keep]) > 0:
             raise LogError(
                 f"{drive.source}: the torque is {float(drive.torque[drive.keep][0]):g} N m throughout",
-                "the torque of a sensor in the column", "check which channel is mapped to steering_wheel_torque",
+                "a torque that turns the wheel", "check which channel is mapped to it",
             )  # fmt: skip
         turning = drive.keep & (np.abs(drive.lateral) > TURNS) & (drive.speed > 5.0)
         if turning.sum() * drive.dt < 5.0:

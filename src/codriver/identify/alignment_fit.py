@@ -9,6 +9,8 @@ and tau, s, are the standard deviation and the correlation time of e itself, fou
 in N m. A coefficient that the drives alone leave wider than half its prior is not told: it is held at the usual value, and
 refused.
 
+The whole load on a column, which no assist takes a share of, has no T_s (WHOLE).
+
 Standard errors are those of the drives alone, by blocks of BLOCK seconds, A^-1 B A^-1: A the curvature of the sum without the
 prior, B the sum of the squared scores of the blocks. They need no tau, and count what is alike within a block.
 """
@@ -39,6 +41,8 @@ LETTERS = {
     "T_c": ("coulomb", "steering_friction", 1.0, "N*m"),
     "w": ("width", "steering_friction_width", 1.0, "rad"),
 }
+WHOLE = tuple(letter for letter in LETTERS if letter != "T_s")
+NO_BEND = 1000.0  # N m, T_s that bends nothing; a vehicle file holds no infinite number
 TOLD = 0.5  # of the prior's width
 BLOCK, LEAST_BLOCKS = 20.0, 3  # s, and blocks a coefficient that shorten them in a short drive
 START = (0.3, 3.0)  # s, N m, and tau, s
@@ -106,18 +110,25 @@ def fit_map(rows: Chosen, start: AlignmentModel, free: Sequence[str] = tuple(LET
     return MapFit(model, free, middle + width * u, width * _standard_errors(rows, found.jac, found.fun), sd, time)
 
 
-def fit_told(rows: Chosen, start: AlignmentModel) -> tuple[MapFit, tuple[str, ...]]:
+def fit_told(
+    rows: Chosen, start: AlignmentModel, letters: Sequence[str] = tuple(LETTERS)
+) -> tuple[MapFit, tuple[str, ...]]:
     """The fit of what the drives tell, and the letters that they do not; those are as usual.
 
     What is told least goes first, since the others can be told better then.
+
+    Args:
+        rows: drives, and which rows of each count.
+        start: what is not fitted.
+        letters: to fit.
     """
-    fit, refused = fit_map(rows, start), []
+    fit, refused = fit_map(rows, start, letters), []
     while (lost := fit.worst()) is not None:
         refused.append(lost)
         if lost == "k_a":
             break
         usual: dict[str, Any] = {LETTERS[letter][0]: USUAL[LETTERS[letter][1]] for letter in refused}
-        fit = fit_map(rows, replace(start, **usual), [letter for letter in LETTERS if letter not in refused])
+        fit = fit_map(rows, replace(start, **usual), [letter for letter in letters if letter not in refused])
     return fit, tuple(refused)
 
 

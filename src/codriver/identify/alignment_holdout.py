@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from codriver.identify.alignment_drive import Drive
-from codriver.identify.alignment_fit import Chosen, correlation_time, fit_told, modelled
+from codriver.identify.alignment_fit import LETTERS, Chosen, correlation_time, fit_told, modelled
 from codriver.identify.regression import rms
 from codriver.models.alignment import AlignmentModel
 from codriver.signals.grid import Flags
@@ -64,13 +64,13 @@ class HoldOut:
     predicted: tuple[Array, ...] = field(repr=False)
 
 
-def hold_out(drives: Sequence[Drive], start: AlignmentModel) -> HoldOut:
+def hold_out(drives: Sequence[Drive], start: AlignmentModel, letters: Sequence[str] = tuple(LETTERS)) -> HoldOut:
     """Leave each part out in turn."""
     by_drive = len(drives) > 1
     predicted = [{way: np.full(d.time.size, np.nan) for way in WAYS} for d in drives]
     parts = []
     for name, rest, out in _drives(drives) if by_drive else _blocks(drives[0]):
-        fit, _ = fit_told(rest, start)
+        fit, _ = fit_told(rest, start, letters)
         theta = regression(rest)
         mean = float(np.mean(np.concatenate([d.torque[keep] for d, keep in rest])))
         k, keep = out

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from codriver.finding import Finding
-from codriver.identify.alignment_drive import Drive
+from codriver.identify.alignment_drive import MOTOR, TORQUE, Drive
 from codriver.identify.alignment_fit import LETTERS, MapFit
 from codriver.identify.alignment_holdout import HoldOut
 from codriver.identify.brake_fit import Refusal
@@ -52,6 +52,7 @@ class AlignmentFit:
         findings: what is to say.
         assumed: geometry that the vehicle lacks: name and the usual value.
         source: of the logs.
+        by: standard name of the torque that turned the wheel.
     """
 
     coefficients: Mapping[str, AlignmentCoefficient]
@@ -66,6 +67,7 @@ class AlignmentFit:
     findings: tuple[Finding, ...] = ()
     assumed: Mapping[str, float] = field(default_factory=dict)
     source: str = ""
+    by: str = TORQUE
 
     @property
     def minutes(self) -> float:
@@ -86,6 +88,10 @@ class AlignmentFit:
         for parameter, value in self.assumed.items():
             source = "a usual passenger car's; alignment_gain was found with it, and goes with it"
             new = new.with_parameter(parameter, value, source=source)
+        if self.by == MOTOR:
+            what = "the whole load on the column, identified by the motor's torque"
+            new = new.with_parameter("alignment_whole", 1.0, source=what)
+            new = new.with_parameter("alignment_bend", self.model.bend, source=f"{what}: nothing bends it")
         if self.held.whole is not None:
             what = "drives" if self.held.by_drive else "blocks"
             source = f"of {what} left out, {self.held.whole.seconds / 60:.1f} min of {self.source}"

@@ -6,6 +6,7 @@
     motor      T_aln = steering_motor_torque                          a force-feedback wheel: the motor is all that acts
     command    T_aln = torque_scale T_com + torque_offset             the same, in the device's own unit (89)
     map        T_aln of `models.alignment`, from angle and speed      a car: tyres less assist, as hands feel them
+    assist     the same of tyres alone, and steering_motor_torque     a car whose motor's torque is known
     track      (92) with a single track, from angle and speed         a car whose tyres are known
 
 Friction of the first three is Dahl's: its state z runs towards the direction of motion within the angle w, so nothing chatters when
@@ -27,7 +28,7 @@ from dataclasses import dataclass
 from math import exp, pi
 
 from codriver.finding import Finding
-from codriver.kernel import Scalar, select
+from codriver.kernel import Scalar, both, select
 from codriver.models.alignment import AlignmentModel
 from codriver.observers.observer import Scalars
 from codriver.vehicles import Vehicle
@@ -177,6 +178,26 @@ def car_column(vehicle: Vehicle, dt: float) -> Column:
     return Column(
         ("longitudinal_speed",), _map_carry(model), at, {"known_torque": "map of angle and speed"}, error=error
     )
+
+
+def assist_column(vehicle: Vehicle, dt: float) -> Column:
+    """The torque of a car's tyres, from angle and speed, and that of its motor.
+
+    Args:
+        vehicle: with alignment_gain and alignment_whole, as `codriver identify alignment --torque steering_motor_torque`
+            writes it from drives without hands; alignment_torque_sd is the map's error, N m.
+        dt: tick, s.
+    """
+    model, motor = AlignmentModel.from_vehicle(vehicle), "steering_motor_torque"
+    error = vehicle.number("alignment_torque_sd") if "alignment_torque_sd" in vehicle else 0.0
+
+    def at(carry: Scalars, u: Scalars, ok: Scalars, angle: Scalar, moved: Scalar) -> Moment:
+        load, states, there = _mapped(model, carry, u, ok, angle, dt)
+        torque = load + select(ok[motor], u[motor], 0.0) - model.coulomb * states["map_presliding"]
+        return Moment(torque, error**2, both(there, ok[motor]), states)
+
+    settings = {"known_torque": "map of angle and speed, motor"}
+    return Column(("longitudinal_speed", motor), _map_carry(model), at, settings, error=error)
 
 
 def single_track_column(vehicle: Vehicle, dt: float) -> Column:

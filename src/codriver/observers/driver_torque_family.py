@@ -3,6 +3,7 @@
 | name                       | what else acts on the column                           | how                       |
 |----------------------------|--------------------------------------------------------|---------------------------|
 | driver-torque-logged       | the log's alignment_torque                             | Kalman filter, with bands |
+| driver-torque-assist       | a map of angle and speed, and steering_motor_torque    | the same                  |
 | driver-torque-car          | a map of angle and speed, identified from drives       | the same                  |
 | driver-torque-single-track | eq. (92) with a single track, from angle and speed     | the same                  |
 | driver-torque-motor        | steering_motor_torque: the motor of a simulator        | the same                  |
@@ -22,7 +23,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from codriver.models.alignment import USUAL
-from codriver.observers.column import Column, car_column, logged_column, single_track_column
+from codriver.observers.column import Column, assist_column, car_column, logged_column, single_track_column
 from codriver.observers.driver_torque import driver_torque_observer
 from codriver.observers.hands import HandsSettings, hands_observer
 from codriver.observers.observer import Observer, chain
@@ -47,20 +48,22 @@ class Source:
     Attributes:
         name: of the estimator.
         parameters: that the vehicle must have.
-        signal: that it needs beside the angle.
+        signals: that it needs beside the angle.
         meaning: as `Estimator` has it.
         column: makes it, of a vehicle for a tick.
         wheel: the vehicle that the wheel's inertia and damping are taken from.
         motor: whether the torque of every motor is in it.
+        forbids: as `Estimator` has it.
     """
 
     name: str
     parameters: tuple[str, ...]
-    signal: str
+    signals: tuple[str, ...]
     meaning: str
     column: Callable[[Vehicle, float], Column]
     wheel: Callable[[Vehicle], Vehicle] = lambda vehicle: vehicle
     motor: bool = True
+    forbids: tuple[str, ...] = ()
 
     def build(self, vehicle: Vehicle | None, design: Design) -> Observer:
         """The Kalman filter with this source, and the hands behind it where they can be told."""
@@ -99,34 +102,39 @@ def _pi(vehicle: Vehicle | None, design: Design) -> Observer:
 
 SOURCES = (
     Source(
-        "driver-torque-logged", WHEEL, "alignment_torque",
+        "driver-torque-logged", WHEEL, ("alignment_torque",),
         "the driver's steering torque from the wheel's angle and the log's alignment torque (2019)", logged_column,
     ),
     Source(
-        "driver-torque-car", ("alignment_gain",), "longitudinal_speed",
-        "the driver's steering torque from angle, speed and a map of the car identified from drives", car_column, usual_wheel,
-        motor=False,
+        "driver-torque-assist", ("alignment_gain", "alignment_whole"), ("longitudinal_speed", "steering_motor_torque"),
+        "the driver's steering torque from angle, speed, the motor's torque and a map of the car", assist_column, usual_wheel,
     ),
     Source(
-        "driver-torque-single-track", (*WHEEL, "alignment_stiffness", *SINGLE_TRACK), "longitudinal_speed",
+        "driver-torque-car", ("alignment_gain",), ("longitudinal_speed",),
+        "the driver's steering torque from angle, speed and a map of the car identified from drives", car_column, usual_wheel,
+        motor=False, forbids=("alignment_whole",),
+    ),
+    Source(
+        "driver-torque-single-track", (*WHEEL, "alignment_stiffness", *SINGLE_TRACK), ("longitudinal_speed",),
         "the driver's steering torque from angle, speed and a single track (2019 eq. 92)", single_track_column,
         motor=False,
     ),
     Source(
-        "driver-torque-motor", WHEEL, "steering_motor_torque",
+        "driver-torque-motor", WHEEL, ("steering_motor_torque",),
         "the driver's steering torque from angle and motor torque, where nothing else acts (2019)",
         lambda vehicle, dt: logged_column(vehicle, dt, "steering_motor_torque"),
     ),
     Source(
-        "driver-torque-command", (*WHEEL, "torque_scale"), "steering_motor_command",
+        "driver-torque-command", (*WHEEL, "torque_scale"), ("steering_motor_command",),
         "the driver's steering torque from angle and motor command, where nothing else acts (2019)",
         lambda vehicle, dt: logged_column(vehicle, dt, "steering_motor_command"),
     ),
 )  # fmt: skip
 for _source in SOURCES:
     register(Estimator(
-        _source.name, _source.parameters, ("steering_wheel_angle", _source.signal), _source.meaning, FAMILY, _source.build,
+        _source.name, _source.parameters, ("steering_wheel_angle", *_source.signals), _source.meaning, FAMILY, _source.build,
         "driver", find=find_torque_noise, tell=lambda noise: noise.settings(), learns=True, forms=("kalman",),
+        forbids=_source.forbids,
     ))  # fmt: skip
 register(Estimator(
     "driver-torque-pi", WHEEL, ("steering_wheel_angle", "alignment_torque"),

@@ -21,7 +21,8 @@ class Feed:
     Attributes:
         estimator: its name.
         missing: standard signals it needs and the log lacks.
-        lacking: parameters it needs and the vehicle lacks; all of them where no vehicle was given.
+        lacking: parameters it needs and the vehicle lacks; all of them where no vehicle was given; "no <parameter>" for those it is
+            not for.
         meaning: what it estimates.
         family: the estimators it is compared with.
     """
@@ -59,7 +60,10 @@ def feeds(signals: Collection[str], vehicle: Vehicle | None, family: str | None 
         Feed(
             name,
             tuple(s for s in needed_signals(name, vehicle) if s not in signals),
-            tuple(p for p in estimator.parameters if vehicle is None or p not in vehicle),
+            (
+                *(p for p in estimator.parameters if vehicle is None or p not in vehicle),
+                *(f"no {p}" for p in estimator.forbids if vehicle is not None and p in vehicle),
+            ),
             estimator.meaning,
             estimator.family,
         )

@@ -59,6 +59,7 @@ class Estimator:
         tell: what provenance says of such a preset.
         learns: whether its noise is fitted to the record where no preset is given.
         forms: the forms it has.
+        forbids: parameters of a vehicle that it is not for.
     """
 
     name: str
@@ -73,6 +74,7 @@ class Estimator:
     tell: Callable[[Any], dict[str, str]] = preset_settings
     learns: bool = False
     forms: tuple[str, ...] = ("kalman", "constant")
+    forbids: tuple[str, ...] = ()
 
 
 def register(estimator: Estimator) -> Estimator:
@@ -115,7 +117,11 @@ def needed_signals(name: str, vehicle: Vehicle | None) -> tuple[str, ...]:
     A car of one gear, for example, may not need the gear. Without a vehicle that has all it takes, what the registry says.
     """
     estimator = get_estimator(name)
-    if vehicle is None or any(p not in vehicle for p in estimator.parameters):
+    if (
+        vehicle is None
+        or any(p not in vehicle for p in estimator.parameters)
+        or any(p in vehicle for p in estimator.forbids)
+    ):
         return estimator.signals
     return build(name, vehicle).required
 
@@ -154,6 +160,13 @@ def build(
         raise UsageError(f"form '{form}'", "'kalman' or 'constant'", "choose one")
     if form not in estimator.forms:
         raise UsageError(f"form '{form}' of {name}", " or ".join(estimator.forms), "leave form (--form) out")
+    strange = [p for p in estimator.forbids if vehicle is not None and p in vehicle]
+    if strange:
+        raise VehicleError(
+            f"{name} is not for a vehicle with {', '.join(strange)}",
+            "one without",
+            "see docs/vehicles.md for what it says",
+        )
     if estimator.parameters and vehicle is None:
         needless = [e.name for e in ESTIMATORS.values() if e.family == estimator.family and not e.parameters]
         raise VehicleError(

@@ -10,18 +10,14 @@ from codriver.estimate import Estimate
 from codriver.measured_torque import compare_with_sensor
 from codriver.report.panels import SIGMAS, on_ticks
 from codriver.report.shown import clock, number, shown, shown_unit, words
+from codriver.report.torque_panels import DRAWN, of_our_own
 from codriver.signals import Log
 from codriver.signals.signal import Array
 from codriver.summary import Summary
 
 ACCELERATIONS = ("intentional_acceleration", "longitudinal_acceleration")
 JERKS = ("intentional_jerk", "longitudinal_jerk")
-LESS = (
-    "longitudinal_speed",
-    "acceleration_offset",
-    "steering_wheel_angle",
-    "steering_wheel_rate",
-)  # their figures say little of the driver
+LESS = ("longitudinal_speed", "acceleration_offset")  # their figures say little of the driver
 SHARED = {"both_pedals": "both pedals pressed", "standstill": "standing still", "hands_on": "hands on the wheel"}
 LONGEST_LAG = 2.0  # s
 
@@ -47,7 +43,8 @@ def figures(estimate: Estimate, told: Summary) -> list[Row]:
         ),
     ]
     first = [name for name in (*JERKS, *ACCELERATIONS) if name in told.estimates]
-    for name in (*first, *(other for other in told.estimates if other not in (*first, *LESS))):
+    less = (*LESS, *(DRAWN[1:] if of_our_own(estimate) else ()))
+    for name in (*first, *(other for other in told.estimates if other not in (*first, *less))):
         found, unit = told.estimates[name], shown_unit(name, told.estimates[name].unit)
         if found.rms is None or found.p5 is None or found.p95 is None:
             rows.append(Row(words(name), "–", "nothing valid"))

@@ -58,6 +58,13 @@ KNOWN: dict[str, Known] = {
     "alignment_offset": Known(
         "N*m", -10, 10, False, "T_0, driver's torque that holds the wheel at the angle 0 (alignment.md)"
     ),
+    "alignment_whole": Known(
+        "1",
+        1,
+        1,
+        False,
+        "there, and 1, where the alignment map is the whole load on the column and no assist's share is taken off",
+    ),
     "alignment_torque_sd": Known("N*m", 0, 50, False, "standard deviation of what the alignment map leaves out"),
     "alignment_torque_time": Known("s", 0, 1e3, False, "correlation time of what the alignment map leaves out"),
     "steering_friction_width": Known("rad", 1e-5, 1, False, "w, angle over which the column's friction builds up"),
