@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from conftest import recording
-from recorded_column import (
+from codriver.papers.steering2019.recorded_column import (
     HANDS_LEAVE,
     Assisted,
     Shaft,
@@ -19,6 +18,7 @@ from recorded_column import (
     regression,
     shaft,
 )
+from conftest import recording
 
 
 def rms(x: np.ndarray) -> float:

@@ -198,8 +198,16 @@ def main(drives: int) -> None:
 def recorded() -> None:
     """Driver torque and hands in the assisted car; shaft torque in the simulator."""
     root = Path(__file__).parents[2]
-    sys.path.insert(0, str(root / "tests"))
-    from recorded_column import assisted_column, brush, correlation_time, explained, hands_by, linear, regression, shaft
+    from codriver.papers.steering2019.recorded_column import (
+        assisted_column,
+        brush,
+        correlation_time,
+        explained,
+        hands_by,
+        linear,
+        regression,
+        shaft,
+    )
 
     data = root.parent / "shared" / "data"
     car = assisted_column(data / "comma2k19-rav4")

@@ -9,18 +9,18 @@ import typer
 
 
 def reproduce(
-    papers: Annotated[list[str], typer.Argument(metavar="PAPER...", help="jerk2017, jerk2015.", show_default=False)],
+    papers: Annotated[list[str], typer.Argument(metavar="PAPER...", help="jerk2017, jerk2015, steering2019.", show_default=False)],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.")] = Path(),
     recordings: Annotated[
         Path, typer.Option("--recordings", metavar="DIR", help="Folder of real recordings, for what is made on them.")
     ] = Path("../shared/data"),
     quick: Annotated[
-        bool, typer.Option("--quick", help="Two drivers instead of six, to see that everything runs.")
+        bool, typer.Option("--quick", help="Fewer drivers and seeds, to see that everything runs.")
     ] = False,
 ) -> None:
     """Make a paper's tables, figures and claims again; DIR/PAPER.html is to be read, DIR/PAPER.json to be processed.
 
-    Example: codriver reproduce jerk2017 jerk2015 -o papers
+    Example: codriver reproduce jerk2017 jerk2015 steering2019 -o papers
     """
     from codriver.papers import PAPERS
     from codriver.papers import reproduce as make

@@ -17,6 +17,10 @@ PAPERS: dict[str, tuple[str, str]] = {
         "codriver.papers.jerk2017",
         "Bisoffi, Biral, Da Lio, Zaccarian 2017, doi:10.1109/TMECH.2017.2716838",
     ),
+    "steering2019": (
+        "codriver.papers.steering2019",
+        "Okamoto, Tsiotras 2019, Robotics and Autonomous Systems",
+    ),
     "jerk2015": ("codriver.papers.jerk2015", "Bisoffi, Biral, Da Lio, Zaccarian 2015, doi:10.1109/ITSC.2015.301"),
 }
 

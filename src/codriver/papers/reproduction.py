@@ -113,4 +113,4 @@ def _with_unit(value: float | str | None, unit: str) -> str:
 
     if value is None or isinstance(value, str):
         return value or "–"
-    return f"{number(value)} {unit if unit != '1' else ''}".strip()
+    return f"{number(value, 4)} {unit if unit != '1' else ''}".strip()
