@@ -76,3 +76,51 @@ def alignment(
         table.add_row(h.name, f"{h.seconds:.0f}", *(f"{h.rmse[way]:.3f}, {h.r2[way]:.2f}" for way in h.rmse))
     head = f"{', '.join(path.name for path in logs)}: {fit.minutes:.1f} min, RMSE {fit.rmse:.3f} N m, R2 {fit.r2:.3f}"
     _say(head, alignment_rows(fit, old), told, table if held else None)
+
+
+@app.command("alignment-stiffness")
+def alignment_stiffness(
+    logs: Logs, out: Out,
+    vehicle: Annotated[str, typer.Option("--vehicle", help="With steering_ratio, front_axle_distance, perhaps a single track.")],
+    dbc: Dbc = None, names: Names = None, bus: Bus = None, report: Report = None, overwrite: Overwrite = False, json: Json = False,
+) -> None:  # fmt: skip
+    """K_aln of eq. 92 (2019), from a simulator's log of the alignment torque or a car's torque sensor.
+
+    Example: codriver identify alignment-stiffness lap.csv --names names.toml --vehicle car.toml -o car2.toml
+    """
+    from codriver.cli.options import check_inputs
+    from codriver.cli.terminal import command_line, working
+    from codriver.identify.alignment_stiffness import identify_alignment_stiffness
+    from codriver.logs import read
+    from codriver.report.alignment_stiffness import stiffness_document, stiffness_rows
+    from codriver.vehicles import load_vehicle
+
+    for path in logs:
+        check_inputs(path, dbc, names)
+    _check_outputs(out, report, [*logs, *(p for p in (dbc, names) if p is not None)], overwrite)
+    old = load_vehicle(vehicle)
+    with working(not json, 2) as stage:
+        stage("reading " + ", ".join(path.name for path in logs))
+        recorded = [read(path, dbc=dbc, names=names, bus=bus) for path in logs]
+        stage("identifying")
+        fit = identify_alignment_stiffness(recorded, old)
+    _write(fit.vehicle(old), stiffness_document(fit, old, command_line()), out, report, overwrite)
+    told: dict[str, Any] = {
+        "logs": [str(path) for path in logs],
+        "coefficients": {
+            "K_aln": {"value": fit.stiffness, "sd": fit.sd, "low": fit.low, "high": fit.high, "unit": "N*m/rad"},
+            "T_0": {"value": fit.offset, "unit": "N*m"},
+        },
+        "seconds": fit.seconds, "rmse_Nm": fit.rmse, "r2": fit.r2, "held_rmse_Nm": fit.held_rmse, "held_r2": fit.held_r2,
+        "slip_from": fit.slip_from, "torque_from": fit.torque_from,
+        "findings": [{"severity": f.severity, "text": f.text} for f in fit.findings],
+        "result": str(out), "report": str(report) if report is not None else None,
+    }  # fmt: skip
+    if json:
+        typer.echo(json_module.dumps(_finite(told), indent=2, ensure_ascii=False, allow_nan=False))
+        return
+    head = (
+        f"{', '.join(path.name for path in logs)}: {fit.seconds:.0f} s, {fit.torque_from}, slip angle of the {fit.slip_from}; RMSE "
+        f"{fit.rmse:.3g} N m, R2 {fit.r2:.3f}; on the half left out {fit.held_rmse:.3g}, {fit.held_r2:.3f}"
+    )
+    _say(head, stiffness_rows(fit, old), told)

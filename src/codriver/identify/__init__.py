@@ -2,6 +2,7 @@
 
 from codriver.identify.alignment import identify_alignment
 from codriver.identify.alignment_result import AlignmentCoefficient, AlignmentFit
+from codriver.identify.alignment_stiffness import StiffnessFit, identify_alignment_stiffness
 from codriver.identify.brake import identify_brake
 from codriver.identify.brake_fit import BrakeFit, Coefficient, Refusal
 from codriver.identify.check_log import check_vehicle_against_log
@@ -26,10 +27,12 @@ __all__ = [
     "SteerRecord",
     "SteerRowFit",
     "SteeringFit",
+    "StiffnessFit",
     "TorqueScale",
     "check_vehicle_against_log",
     "fit_steer_row",
     "identify_alignment",
+    "identify_alignment_stiffness",
     "identify_brake",
     "identify_pedal",
     "identify_ratio",
