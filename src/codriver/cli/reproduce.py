@@ -9,7 +9,9 @@ import typer
 
 
 def reproduce(
-    papers: Annotated[list[str], typer.Argument(metavar="PAPER...", help="jerk2017, jerk2015, steering2019.", show_default=False)],
+    papers: Annotated[
+        list[str], typer.Argument(metavar="PAPER...", help="jerk2017, jerk2015, steering2019.", show_default=False)
+    ],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.")] = Path(),
     recordings: Annotated[
         Path, typer.Option("--recordings", metavar="DIR", help="Folder of real recordings, for what is made on them.")
