@@ -90,7 +90,7 @@ def drive_chapter(lab: Lab) -> Chapter:
     lead = (
         "A simulated driver steers round a circuit at 50 km/h, by a wheel with friction; its log has the angle and the motor's "
         "command. The estimators get J_s and b_s from the chirp and the alignment torque from (89). Beside them stands what the "
-        "paper did not have: the true torque.",
+        "paper did not have: the true torque. Figure 7, photographs of the simulator, has no counterpart.",
     )
     return Chapter("The drive (4.2, figures 8 to 10)", lead, charts, _items(found, wheels))
 
@@ -226,8 +226,8 @@ def _figure_10(found: dict[str, Told]) -> Chart:
     return Chart(
         "Figure 10: the angle from the estimated torque alone", "time (s)",
         (Plot("angle (deg)", (*curves, measured), 280, (0.0,)),),
-        "The wheel (28) turned by the estimate and the alignment torque from the first angle on, never corrected. EKF and UKF lie "
-        "on one another, and so do smoother and measurement.",
+        "The wheel (28) turned by the estimate and the alignment torque from the first angle on, never corrected. EKF and UKF "
+        "lie on one another, and so do smoother and measurement.",
     )  # fmt: skip
 
 

@@ -243,7 +243,8 @@ def filters_chapter(seeds: int, smoothed: int) -> Chapter:
     table = Table(("noise (84) read as", *WAYS, "likelier", "best V_1"), rows, (
         f"RMSE in N m from 1 s on, mean of {seeds} seeds ({smoothed} for the smoother). Tuned on {TUNED} other seeds: the PI "
         "observer and the two walks by their RMSE, the next by likelihood on one record. “No noise” runs what is tuned for dt w. "
-        "Drivers: of the rig (section 4.2 below), on the paper's wheel."
+        "Walk, integrated walk: Kalman filters whose torque is one; of the sum: T_dr + T_aln walks. Drivers: of the rig (section "
+        "4.2 below), on the paper's wheel."
     ))  # fmt: skip
     words = (
         "The paper compares its PI observer with nothing. Kalman filters whose torque is a random walk, or an integrated one, "
