@@ -225,9 +225,9 @@ def _findings(X: Array, y: Array, left: Array, used: Flags, trimmed: float, held
     line = X[used][:, 0] @ alpha[used] / (alpha[used] @ alpha[used]) * float(cubic[0])  # N m/rad
     bend = -float(cubic[-1]) * most**2 / max(abs(line), 1e-300)
     if abs(bend) > BEND:
-        off = "falls short of" if bend > 0 else "exceeds"
+        how = "falls short of" if bend > 0 else "exceeds"
         said.append(Finding(
-            "warn", f"the torque {off} a line by {abs(bend):.0%} at a slip angle of {most:.2g} rad: a tyre's trail shrinks with "
+            "warn", f"the torque {how} a line by {abs(bend):.0%} at a slip angle of {most:.2g} rad: a tyre's trail shrinks with "
             "slip; K_aln is that of this drive's slip angles",
         ))  # fmt: skip
     if trimmed > 0.02:
