@@ -222,7 +222,7 @@ def _findings(X: Array, y: Array, left: Array, used: Flags, trimmed: float, held
     said = []
     cubic = solve(np.column_stack([X[used], alpha[used] ** 3]), y[used])
     most = float(np.quantile(np.abs(alpha[used]), 0.99))
-    line = X[used][:, 0] @ alpha[used] / (alpha[used] @ alpha[used]) * float(cubic[0])  # N m/rad
+    line = float(X[used][:, 0] @ alpha[used] / (alpha[used] @ alpha[used])) * float(cubic[0])  # N m/rad
     bend = -float(cubic[-1]) * most**2 / max(abs(line), 1e-300)
     if abs(bend) > BEND:
         how = "falls short of" if bend > 0 else "exceeds"
