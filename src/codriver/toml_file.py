@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -43,3 +44,8 @@ def parse_tables(text: str, where: str, kind: type[CodriverError]) -> dict[str, 
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise kind(f"{where} is not TOML: {error}", "a TOML file", "mend the line named") from None
+
+
+def quoted(text: str) -> str:
+    """A string as TOML writes it: as JSON does, but DEL too must be escaped."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -21,7 +21,6 @@ Means are natural logarithms (rms and peak in m/s^3, reversals in 1/min). A feat
 
 from __future__ import annotations
 
-import json
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -32,7 +31,7 @@ from codriver.drivers.bands import BANDS
 from codriver.drivers.scale import FEATURES, Scale
 from codriver.errors import UsageError
 from codriver.logs.write import complete_or_nothing
-from codriver.toml_file import parse_tables, read_text
+from codriver.toml_file import parse_tables, quoted, read_text
 
 _KEYS = ("mean", "step", "scatter")
 _EXPECTED = "a scale file as `codriver style --write-reference` writes it"
@@ -93,10 +92,10 @@ def save_scale(scale: Scale, path: str | Path, *, overwrite: bool = False) -> Pa
 def scale_text(scale: Scale) -> str:
     """The text of a scale file."""
     lines = [
-        f"name = {_quoted(scale.name)}", f"source = {_quoted(scale.source)}", f"observer = {_quoted(scale.observer)}",
+        f"name = {quoted(scale.name)}", f"source = {quoted(scale.source)}", f"observer = {quoted(scale.observer)}",
         f"drivers = {scale.drivers}", f"thresholds = [{scale.thresholds[0]!r}, {scale.thresholds[1]!r}]",
         f"without_pedal = [{scale.without_pedal[0]!r}, {scale.without_pedal[1]!r}]", "", "[settings]",
-        *(f"{key} = {_quoted(value)}" for key, value in scale.settings.items()),
+        *(f"{key} = {quoted(value)}" for key, value in scale.settings.items()),
     ]  # fmt: skip
     for b, band in enumerate(BANDS):
         lines += ["", f"[{band.name}]", f"seconds = {float(scale.seconds[b])!r}"]
@@ -186,7 +185,3 @@ def _pair(table: dict[str, Any], key: str, where: str) -> tuple[float, float]:
 
 def _wrong(where: str, what: str, do: str) -> UsageError:
     return UsageError(f"{where}: {what}", _EXPECTED, do)
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

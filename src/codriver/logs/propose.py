@@ -6,7 +6,6 @@ but shows one or two values. A flag that belongs to the channel chosen is propos
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 
@@ -15,6 +14,7 @@ import numpy as np
 from codriver.errors import UnitError
 from codriver.logs.recording import RawSignal, Recording, SourceChannel
 from codriver.names import VOCABULARY
+from codriver.toml_file import quoted
 from codriver.units import to_si
 
 NAME = "longitudinal_speed"
@@ -96,14 +96,9 @@ def _entry(channel: SourceChannel, raw: RawSignal, valid: str | None) -> str:
     shown = f"{finite.min():.4g} to {finite.max():.4g} {channel.unit}".rstrip()
     lines = [
         f"[{NAME}]",
-        f"source = {_quoted(channel.name)}  # {np.unique(finite).size} different values, {shown}",
-        f"unit = {_quoted(unit)}{doubt}",
+        f"source = {quoted(channel.name)}  # {np.unique(finite).size} different values, {shown}",
+        f"unit = {quoted(unit)}{doubt}",
     ]
     if valid is not None:
-        lines.append(f"valid = {_quoted(valid)}  # values count only while it is 1")
+        lines.append(f"valid = {quoted(valid)}  # values count only while it is 1")
     return "\n".join(lines) + "\n"
-
-
-def _quoted(text: str) -> str:
-    """A string as TOML writes it."""
-    return json.dumps(text, ensure_ascii=False)

@@ -12,18 +12,18 @@ files are.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from codriver.errors import UsageError
 from codriver.names import nearest
 from codriver.observers.scaled_gain import ELL_RANGE, PRESETS, Preset
-from codriver.toml_file import parse_tables, read_text
+from codriver.toml_file import parse_tables, quoted, read_text
 from codriver.whole_file import write_text
 
+T = TypeVar("T")
 _KEYS = ("name", "source", "ell", "Q", "R")
 _EXPECTED = "name, source, ell, Q (four numbers) and R (two numbers), each above 0"
 
@@ -36,16 +36,34 @@ def find_preset(preset: str | Path | Preset) -> Preset:
     """
     if isinstance(preset, Preset):
         return preset
-    if str(preset) in PRESETS:
-        return PRESETS[str(preset)]
+    return named_or_file(preset, PRESETS, parse_preset, "", "write one with `codriver tune`")
+
+
+def named_or_file(
+    preset: str | Path, built_in: Mapping[str, T], parse: Callable[[str, str], T], of_what: str, otherwise: str
+) -> T:
+    """A built-in preset by its name, or that of a file by its path.
+
+    Args:
+        preset: name or path.
+        built_in: presets by name.
+        parse: (text, where) -> preset.
+        of_what: for the message: " for a steering torque".
+        otherwise: for the message: what to do beside choosing one.
+
+    Raises:
+        UsageError: there is neither, or the file is wrong.
+    """
+    if str(preset) in built_in:
+        return built_in[str(preset)]
     path = Path(preset)
     if path.suffix != ".toml" and not path.exists():
-        near = nearest(str(preset), PRESETS)
+        near = nearest(str(preset), built_in)
         raise UsageError(
-            f"no preset '{preset}'", f"one of {', '.join(PRESETS)}, or the path of a .toml file",
-            f"did you mean {near}?" if near else "choose one, or write one with `codriver tune`",
+            f"no preset '{preset}'{of_what}", f"one of {', '.join(built_in)}, or the path of a .toml file",
+            f"did you mean {near}?" if near else f"choose one, or {otherwise}",
         )  # fmt: skip
-    return parse_preset(read_text(path, "preset", UsageError), str(path))
+    return parse(read_text(path, "preset", UsageError), str(path))
 
 
 def parse_preset(text: str, where: str) -> Preset:
@@ -79,11 +97,8 @@ def save_preset(preset: Preset, path: str | Path) -> None:
     Raises:
         UsageError: the name does not end in .toml, the file cannot be written, or it would not be read again.
     """
-    target = Path(path)
-    if target.suffix != ".toml":
-        raise UsageError(f"cannot write a preset to '{target.name}'", "a name ending in .toml", "choose such a name")
     text = (
-        f"name = {_quoted(preset.name)}\nsource = {_quoted(preset.source)}\nell = {preset.ell!r}\n"
+        f"name = {quoted(preset.name)}\nsource = {quoted(preset.source)}\nell = {preset.ell!r}\n"
         "# intensities of v (m^2/s^3), a_i (m^2/s^5), o_a (m^2/s^5), j_i (m^2/s^7)\n"
         f"Q = {list(preset.Q)!r}\n"
         "# of the accelerometer (m^2/s^3) and the speed (m^2/s)\n"
@@ -91,6 +106,18 @@ def save_preset(preset: Preset, path: str | Path) -> None:
     )
     if parse_preset(text, "the preset") != preset:
         raise UsageError(f"the file of '{preset.name}' would be read as another preset", _EXPECTED, "check its numbers")
+    write_preset(text, path)
+
+
+def write_preset(text: str, path: str | Path) -> None:
+    """Write the text of a preset's file.
+
+    Raises:
+        UsageError: the name does not end in .toml, or the file cannot be written.
+    """
+    target = Path(path)
+    if target.suffix != ".toml":
+        raise UsageError(f"cannot write a preset to '{target.name}'", "a name ending in .toml", "choose such a name")
     try:
         write_text(target, text)
     except OSError as error:
@@ -125,8 +152,3 @@ def _numbers(values: tuple[float, ...]) -> str:
 
 def _positive(x: Any) -> bool:
     return isinstance(x, (int, float)) and not isinstance(x, bool) and isfinite(x) and x > 0
-
-
-def _quoted(text: str) -> str:
-    """A string as TOML writes it: as JSON does, but DEL too must be escaped."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -23,16 +23,14 @@ maximum likelihood on a record; a file holds them:
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from codriver.errors import UsageError
-from codriver.names import nearest
-from codriver.toml_file import parse_tables, read_text
-from codriver.whole_file import write_text
+from codriver.observers.preset_file import named_or_file, write_preset
+from codriver.toml_file import parse_tables, quoted
 
 _NUMBERS = ("angle", "slip", "rate", "torque")
 _KEYS = ("name", "source", "order", "balance", *_NUMBERS)
@@ -101,17 +99,8 @@ def find_torque_noise(preset: str | Path | TorqueNoise) -> TorqueNoise:
             "a TorqueNoise, a name or a path",
             "give one",
         )
-    if str(preset) in TORQUE_NOISES:
-        return TORQUE_NOISES[str(preset)]
-    path = Path(preset)
-    if path.suffix != ".toml" and not path.exists():
-        near = nearest(str(preset), TORQUE_NOISES)
-        raise UsageError(
-            f"no preset '{preset}' for a steering torque",
-            f"one of {', '.join(TORQUE_NOISES)}, or the path of a .toml file; or none: it is fitted to the record then",
-            f"did you mean {near}?" if near else "choose one, or write one with `codriver tune driver-torque`",
-        )  # fmt: skip
-    return parse_torque_noise(read_text(path, "preset", UsageError), str(path))
+    otherwise = "none, to have it fitted to the record; `codriver tune driver-torque` writes one"
+    return named_or_file(preset, TORQUE_NOISES, parse_torque_noise, " for a steering torque", otherwise)
 
 
 def parse_torque_noise(text: str, where: str) -> TorqueNoise:
@@ -152,12 +141,9 @@ def save_torque_noise(noise: TorqueNoise, path: str | Path) -> None:
     Raises:
         UsageError: the name does not end in .toml, the file cannot be written, or it would not be read again.
     """
-    target = Path(path)
-    if target.suffix != ".toml":
-        raise UsageError(f"cannot write a preset to '{target.name}'", "a name ending in .toml", "choose such a name")
     per = "N m per sqrt(s)" if noise.order == 1 else "N m/s per sqrt(s)"
     text = (
-        f"name = {_quoted(noise.name)}\nsource = {_quoted(noise.source)}\n"
+        f"name = {quoted(noise.name)}\nsource = {quoted(noise.source)}\n"
         f"# of the torque's random walk: 1, or 2 for an integrated one\norder = {noise.order}\n"
         "# what walks: 0 the driver's torque, 1 its sum with what else acts on the column\n"
         f"balance = {noise.balance}\n"
@@ -167,18 +153,8 @@ def save_torque_noise(noise: TorqueNoise, path: str | Path) -> None:
     )
     if replace(parse_torque_noise(text, "the preset"), name=noise.name) != noise:
         raise UsageError(f"the file of '{noise.name}' would be read as another one", _EXPECTED, "check its numbers")
-    try:
-        write_text(target, text)
-    except OSError as error:
-        raise UsageError(
-            f"cannot write {path}: {error.strerror or error}", "a folder you may write into", "choose another name"
-        ) from error
+    write_preset(text, path)
 
 
 def _number(x: Any) -> bool:
     return isinstance(x, (int, float)) and not isinstance(x, bool) and isfinite(x)
-
-
-def _quoted(text: str) -> str:
-    """A string as TOML writes it: as JSON does, but DEL too must be escaped."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

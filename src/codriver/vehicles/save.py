@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from codriver.errors import VehicleError
+from codriver.toml_file import quoted
 from codriver.vehicles.load import parse_vehicle
 from codriver.vehicles.vehicle import Parameter, Vehicle
 from codriver.whole_file import write_text
@@ -48,24 +48,19 @@ def save_vehicle(vehicle: Vehicle, path: str | Path, *, overwrite: bool = False)
 
 def _text(vehicle: Vehicle) -> str:
     """The text of a vehicle's file."""
-    head = f"name = {_quoted(vehicle.name)}\ntitle = {_quoted(vehicle.title)}\nsource = {_quoted(vehicle.source)}\n"
+    head = f"name = {quoted(vehicle.name)}\ntitle = {quoted(vehicle.title)}\nsource = {quoted(vehicle.source)}\n"
     return head + "".join(_table(parameter) for parameter in vehicle.parameters.values())
 
 
 def _table(parameter: Parameter) -> str:
     """One parameter's table."""
-    lines = [f"[{parameter.name}]", f"value = {_number(parameter.value)}", f"unit = {_quoted(parameter.unit)}"]
+    lines = [f"[{parameter.name}]", f"value = {_number(parameter.value)}", f"unit = {quoted(parameter.unit)}"]
     if parameter.sd is not None:
         lines.append(f"sd = {_number(parameter.sd)}")
-    lines.append(f"source = {_quoted(parameter.source)}")
+    lines.append(f"source = {quoted(parameter.source)}")
     return "\n" + "\n".join(lines) + "\n"
 
 
 def _number(value: float | tuple[float, ...]) -> str:
     """A number or list of numbers with all their digits."""
     return f"[{', '.join(map(_number, value))}]" if isinstance(value, tuple) else repr(float(value))
-
-
-def _quoted(text: str) -> str:
-    """A string as TOML writes it: as JSON does, but DEL too must be escaped."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
