@@ -373,11 +373,12 @@ class TestAssist:
     """A car that keeps its lane by a motor whose torque the log holds: the map from drives without hands, then hands on and off."""
 
     @pytest.fixture(scope="class")
-    def car(self) -> Vehicle:
+    @classmethod
+    def car(cls) -> Vehicle:
         from codriver.identify import identify_alignment
 
         empty = HandsSetting(off_dwell=1e9, on_dwell=1e-6, seconds=200.0, curvature=0.003)
-        drives = [self.log(simulate_hands(replace(empty, speed=v), seed=700 + int(v)), v) for v in (15.0, 22.0, 30.0)]
+        drives = [cls.log(simulate_hands(replace(empty, speed=v), seed=700 + int(v)), v) for v in (15.0, 22.0, 30.0)]
         return identify_alignment(drives, by="steering_motor_torque").vehicle(name="lane-keeper")
 
     @staticmethod
