@@ -35,6 +35,10 @@ def golden_inputs(program: Program, rows: int = ROWS, seed: int = 7) -> Grid:
             column = speed + 0.02 * rng.standard_normal(rows) * (speed > 0)
         elif name == "longitudinal_acceleration":
             column = np.gradient(speed, observer.dt * 10) + 0.2 + 0.1 * rng.standard_normal(rows)
+        elif name == "steering_wheel_angle":
+            # As a hand turns it, with an encoder's steps; then the encoder jumps, and later wraps.
+            turned = np.round((1.5 * np.sin(6 * np.pi * t) + 0.4 * t) / 0.002) * 0.002
+            column = turned + 0.9 * (t > 0.6) - 2 * np.pi * (t > 0.8)
         elif name == "gear":
             column = np.repeat(
                 rng.choice([0, 1, 2, 3, 4, 5, -1], rows // 20 + 1, p=[0.1, 0.2, 0.2, 0.2, 0.15, 0.1, 0.05]), 20

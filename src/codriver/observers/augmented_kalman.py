@@ -119,9 +119,24 @@ def update(
         for factor, known in zip(filter.D[k], given, strict=True):
             expected = expected + plain(factor) * known if factor != 0 else expected
         e = select(there, value - expected, 0.0)
+        seen = [i for i, c in enumerate(h) if c != 0]
+        before = P
         x, P, s = update_row(x, P, h, e, filter.R[k], there)
+        if len(seen) == 1:
+            P = _without_cancelling(before, P, seen[0], select(there, filter.R[k] / s, 1.0))
         told.append(Row(e, s))
     return Moments(x, P), told
+
+
+def _without_cancelling(before: Matrix, after: Matrix, state: int, share: Scalar) -> Matrix:
+    """The updated covariance with the measured state's row as P r / s, which equals P - P P / s and loses no digits.
+
+    An encoder is far better than what a filter knows of the angle behind a gap or a start; in single precision the difference
+    would be noise.
+    """
+    n = len(after)
+    row = [share * before[state][j] for j in range(n)]
+    return [[row[j] if i == state else row[i] if j == state else after[i][j] for j in range(n)] for i in range(n)]
 
 
 def chosen(when: Scalar, yes: Moments, no: Moments) -> Moments:
