@@ -319,6 +319,42 @@ class TestBadAngles:
         assert rms(e) < 0.2
         assert np.mean(np.abs(e) < 1.96 * sd) > 0.9
 
+    @pytest.mark.parametrize("name", [NAME, "driver-torque-pi"])
+    def test_an_encoders_faults_do_not_reach_either_estimator(self, plain, name):
+        """Wraps, jumps, wrong samples and gaps: hardly worse where valid than without them, and told."""
+        car, noise = vehicle_of(SMOOTH), {"preset": TORQUE_NOISES["driver"]} if name == NAME else {}
+        clean = plain.measured
+        wrapped = np.mod(4 * clean + pi, 2 * pi) - pi
+        spiked = clean.copy()
+        spiked[700::800] += 1.0
+        silent = (plain.time < 20) | (plain.time > 25)
+        for angle, keep, said, scale in (
+            (wrapped, None, "wraps", 4), (spiked, None, "jumps", 1), (clean, silent, "", 1),
+        ):  # fmt: skip
+            good = estimate_log(name, with_angle(plain, scale * clean), car, **noise)
+            run = estimate_log(name, with_angle(plain, angle, keep), car, **noise)
+            n = min(len(run.grid), len(good.grid))
+            both = run.valid[:n] & good.valid[:n]
+            off = (run.columns["driver_torque"][:n] - good.columns["driver_torque"][:n])[both]
+            assert both.mean() > 0.85
+            assert rms(off) < 0.05
+            assert any(said in f.text for f in run.check().findings), said
+            if keep is not None:
+                assert not run.valid[(run.time > 20.6) & (run.time < 24.9)].any()
+
+    @pytest.mark.parametrize("order", [1, 2])
+    def test_it_recovers_from_any_gap(self, plain, order):
+        """A filter that extrapolates through a gap must not take what comes after it for jumps."""
+        noise = TorqueNoise(order, 5e-4, 0.0, 0.0, {1: 0.6, 2: 8.0}[order])
+        for length in (0.6, 4.0, 20.0):
+            keep = (plain.time < 20) | (plain.time > 20 + length)
+            run = estimate_log(
+                NAME, with_angle(plain, plain.measured, keep), vehicle_of(SMOOTH), preset=noise, rate=100.0
+            )
+            after = run.time > 21 + length
+            assert run.valid[after].mean() > 0.99
+            assert not run.flag("angle_jump").any()
+
     def test_what_cannot_be(self, plain):
         log, car = plain.log(), vehicle_of(SMOOTH)
         only = cd.Log.of([log["steering_wheel_angle"]], source="angle only")
@@ -336,6 +372,89 @@ class TestBadAngles:
         with pytest.raises(LogError, match="at least 300"):
             estimate_log(NAME, short, car)
         assert estimate_log(NAME, short, car, preset="driver").valid.any()
+
+
+class TestVerdict:
+    """What the innovations cannot show."""
+
+    def told(self, log: cd.Log, car: Vehicle | None = None) -> dict[str, str]:
+        run = estimate_log(NAME, log, car or vehicle_of(SMOOTH))
+        return {f.text: f.severity for f in run.check().findings}
+
+    def severity(self, found: dict[str, str], words: str) -> str | None:
+        return next((severity for text, severity in found.items() if words in text), None)
+
+    def test_a_sound_log(self, plain):
+        found = self.told(plain.log())
+        assert set(found.values()) == {"ok"}
+        assert self.severity(found, "a wrong scale or a delay would show nowhere") == "ok"
+
+    @pytest.mark.parametrize(
+        ("factor", "words", "severity"),
+        [
+            (-1.0, "goes with the wheel's angle", "bad"),
+            (100.0, "hands do not give", "bad"),
+            (0.0, "0 throughout", "bad"),
+        ],
+    )
+    def test_known_torque(self, plain, factor, words, severity):
+        log = plain.log()
+        wrong = replace(log["alignment_torque"], values=factor * log["alignment_torque"].values + 0.0)
+        assert self.severity(self.told(log.with_signals(wrong)), words) == severity
+
+    def test_known_torque_that_scatters_or_comes_rarely(self, plain):
+        log, rng = plain.log(), np.random.default_rng(1)
+        noisy = replace(
+            log["alignment_torque"], values=plain.alignment_torque + 0.3 * rng.standard_normal(plain.time.size)
+        )
+        assert self.severity(self.told(log.with_signals(noisy)), "scatters by 0.3 N m") == "warn"
+        rare = cd.Signal("alignment_torque", plain.time[::25], 5 * plain.alignment_torque[::25], "N*m", "model")
+        assert self.severity(self.told(log.with_signals(rare)), "comes every 0.25 s") == "warn"
+
+    def test_an_angle_that_hangs(self, plain):
+        still = with_angle(plain, np.full(plain.time.size, 0.2))
+        assert self.severity(self.told(still), "moves by 0 deg in all") == "bad"
+
+    def test_an_assist_motor_taken_for_force_feedback(self):
+        """A car's motor helps the driver; without the tyres the answer would be wrong, and looks fine to the innovations."""
+        setting = HandsSetting(seconds=120.0)
+        drive = simulate_hands(setting, seed=903)
+        log = cd.Log.of([
+            drive.log()["steering_wheel_angle"],
+            cd.Signal("steering_motor_torque", drive.time, drive.motor_torque[0], "N*m", "motor"),
+        ])  # fmt: skip
+        run = estimate_log("driver-torque", log, setting.vehicle())
+        assert run.observer == "driver-torque-motor"
+        assert any(f.severity == "bad" and "assist motor" in f.text for f in run.check().findings)
+
+    def test_a_sensor_that_does_not_agree(self, plain):
+        from codriver.measured_torque import sensor_findings
+
+        for factor, severity in ((1.0, "ok"), (-1.0, "bad"), (2.0, "bad")):
+            sensor = cd.Signal("steering_wheel_torque", plain.time, factor * plain.driver_torque, "N*m", "sensor")
+            run = estimate_log(NAME, plain.log().with_signals(sensor), vehicle_of(SMOOTH))
+            assert [f.severity for f in sensor_findings(run)] == [severity]
+
+    def test_unusual_wheels_and_what_a_file_leaves_out(self, plain):
+        from codriver.observers.column import wheel_findings
+
+        heavy = vehicle_of(SMOOTH, steering_inertia=3.0)
+        run = estimate_log(NAME, plain.log(), heavy)
+        assert any("J_s = 3" in f.text for f in wheel_findings(heavy, run.provenance))
+        bare = Vehicle("bare", "b", "t", {
+            k: v for k, v in vehicle_of(SMOOTH).parameters.items() if k != "steering_friction"
+        })  # fmt: skip
+        assert any("no steering_friction" in f.text for f in wheel_findings(bare, run.provenance))
+        assert wheel_findings(vehicle_of(SMOOTH), estimate_log(NAME, plain.log(), vehicle_of(SMOOTH)).provenance) == []
+
+    def test_too_few_angles_say_why(self, plain):
+        degrees = with_angle(plain, plain.measured * 180 / pi * 20)
+        with pytest.raises(LogError, match="degrees taken for radians"):
+            estimate_log(NAME, degrees, vehicle_of(SMOOTH))
+        log = plain.log()
+        rare = cd.Signal("alignment_torque", plain.time[::200], plain.alignment_torque[::200], "N*m", "model")
+        with pytest.raises(LogError, match="comes too rarely"):
+            estimate_log(NAME, log.with_signals(rare), vehicle_of(SMOOTH))
 
 
 class TestAgainstTheLog:

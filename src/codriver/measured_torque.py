@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from codriver.estimate import Estimate
+from codriver.finding import Finding
 from codriver.models.steering import tick_of
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
@@ -24,6 +25,7 @@ SENSORS = ("driver_torque", "steering_wheel_torque")  # the first there is
 RESTART = 10.0  # s
 LEAST = 50  # ticks
 SIGMAS = 1.96
+BAD_SHARE, GOOD_SHARE = 0.65, 0.85  # of the sensor's values in the 95 % band
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,24 @@ def compare_with_sensor(estimate: Estimate) -> SensorComparison | None:
         1 - square / total if total > 0 else float("nan"), float(moved @ spread) / size if size > 0 else float("nan"),
         None if sd is None else float(np.mean(np.abs(error) <= SIGMAS * sd[use])), float(np.sqrt(total / use.sum())),
     )  # fmt: skip
+
+
+def sensor_findings(estimate: Estimate) -> list[Finding]:
+    """What a torque sensor in the log says of the estimate; nothing where there is none."""
+    found = compare_with_sensor(estimate)
+    if found is None:
+        return []
+    if found.correlation < -0.2:
+        return [
+            Finding(
+                "bad",
+                f"{found.told()}: they go against each other (correlation {found.correlation:.2f}); a wrong sign?",
+            )
+        ]
+    if found.covered is None:
+        return [Finding("bad" if found.r2 < 0 else "ok", found.told())]
+    severity = "bad" if found.covered < BAD_SHARE else "warn" if found.covered < GOOD_SHARE else "ok"
+    return [Finding(severity, found.told())]
 
 
 def on_ticks(estimate: Estimate, name: str, longest: float = 0.25) -> Array:

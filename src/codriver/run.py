@@ -15,7 +15,7 @@ from codriver.torque_fit import fit_torque_noise
 from codriver.vehicles import Vehicle
 
 RATES = (1.0, 10000.0)  # Hz
-MANY = 2  # better estimators that are named one by one
+LONG = 420  # characters of what better estimators lack; beyond, they are counted
 
 
 def choose(name: str, log: Log, vehicle: Vehicle | None = None) -> tuple[str, str]:
@@ -39,7 +39,7 @@ def choose(name: str, log: Log, vehicle: Vehicle | None = None) -> tuple[str, st
         if other.estimator == feed.estimator:
             break
         better.append(f"{other.estimator} lacks {other.lacks(vehicle)}")
-    if len(better) > MANY:
+    if sum(map(len, better)) > LONG:
         better = [f"{len(better)} better ones lack signals or vehicle parameters: codriver info says which"]
     return feed.estimator, "the best this log can feed" + (f" ({'; '.join(better)})" if better else "")
 

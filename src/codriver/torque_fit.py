@@ -82,7 +82,7 @@ def fit_torque_noise(
     """
     dt, several = 1.0 / rate, [logs] if isinstance(logs, Log) else list(logs)
     observer = build(name, vehicle, dt=dt, preset=_CAUTIOUS)
-    wanted = ("column_torque", "inputs_known", "angle_turns", "angle_jump", f"{ANGLE}_used")
+    wanted = ("column_torque", "inputs_known", "angle_turns", "restarted", f"{ANGLE}_used")
     program = compile(observer, wanted)
     runs = [program.run(log) for log in several]
     rows = _joined([_rows(run.columns, run.grid, LONGEST / len(runs)) for run in runs])
@@ -90,8 +90,9 @@ def fit_torque_noise(
     counted, source = rows.counted, ", ".join(log.source for log in several if log.source) or "a record"
     if counted.sum() < LEAST_ROWS:
         raise LogError(
-            f"{source}: {int(counted.sum())} angles with a known torque on the column for {SETTLING:g} s before",
-            f"at least {LEAST_ROWS} to fit the noise to", "give a longer record, or a preset (--preset)",
+            f"{source}: {int(counted.sum())} angles with a known torque on the column for {SETTLING:g} s before"
+            + _why_so_few([run.columns for run in runs]),
+            f"at least {LEAST_ROWS} to fit the noise to", "correct what is named, or give a longer record or a preset (--preset)",
         )  # fmt: skip
     steps = [_step_of(run.grid.values[ANGLE][run.grid.fresh[ANGLE]]) for run in runs]
     floor = min(steps) ** 2 / 12
@@ -112,6 +113,21 @@ def fit_torque_noise(
     )
 
 
+def _why_so_few(runs: Sequence[Mapping[str, Array]]) -> str:
+    """What keeps the rows from counting, for people."""
+    used = sum(float(c[f"{ANGLE}_used"].sum()) for c in runs)
+    anew = sum(float(c["restarted"].sum()) for c in runs)
+    known = float(np.mean(np.concatenate([c["inputs_known"] for c in runs]) > 0.5))
+    if anew > 0.05 * max(used + anew, 1.0):
+        return (
+            f"; the angle leaps or has gaps at {anew:.0f} of {used + anew:.0f} samples: degrees taken for radians, stamps in "
+            "another unit, or a slow sensor?"
+        )
+    if known < 0.5:
+        return f"; the torque on the column is known for {known:.0%} of the time: it is missing, or comes too rarely"
+    return ""
+
+
 @dataclass(frozen=True, eq=False)
 class _Rows:
     """A record as the likelihood takes it: columns of the grid, and which rows count."""
@@ -128,11 +144,11 @@ class _Rows:
 
 def _rows(columns: Mapping[str, Array], grid: Grid, longest: float) -> _Rows:
     """Column torque, unwrapped angle and resets, with the ticks that count; at most so many seconds of it."""
-    known, jump, fresh = columns["inputs_known"] > 0.5, columns["angle_jump"] > 0.5, grid.fresh[ANGLE]
+    known, anew, fresh = columns["inputs_known"] > 0.5, columns["restarted"] > 0.5, grid.fresh[ANGLE]
     angle = np.where(fresh, grid.values[ANGLE] + columns["angle_turns"], 0.0)
     chosen = _chosen(fresh.size, grid.dt, longest)
     # Each piece begins anew with its first angle.
-    reset = jump.copy()
+    reset = anew.copy()
     for start in np.flatnonzero(chosen & ~np.r_[False, chosen[:-1]]):
         later = np.flatnonzero(fresh[start:])
         reset[start : start + (int(later[0]) if later.size else fresh.size) + 1] = True

@@ -12,6 +12,7 @@ looked at, where the estimate is valid:
 * the sensors against each other: accelerometer and change of speed must go together, else a sign or a unit is wrong;
 * the accelerometer offset: more than 3 m/s^2 is no road;
 * pedals that go with the car and stay far below what a foot does: a unit that is too small;
+* a steering wheel's encoder and what is known to act on its column (`steering_trust.py`);
 * brake and known input: a brake that is always pressed, a powertrain that adds more than the vehicle shows;
 * used signals most of whose samples no vehicle can show: a unit or a scale is wrong.
 
@@ -33,6 +34,7 @@ from codriver.observers.observer import Output
 from codriver.sensors_agree import pedals_move, sensors_agree
 from codriver.signals import Grid, Log
 from codriver.signals.signal import Array
+from codriver.steering_trust import ENCODER, steering_findings
 
 # Of squares: scatter and lean of 1.5, 2.5, 4 and 0.25 times the band. And m/s^2.
 LARGE, WRONG, BAD_STRETCH, SMALL, STEEP = 2.25, 6.25, 16.0, 0.0625, 3.0
@@ -118,7 +120,8 @@ def check_estimate(
                 "time, more than any road: "
                 + ("is its axis, unit or sign right?" if always else "a slide, a crash, a bad sensor?"), _spans(steep, grid),
             ))  # fmt: skip
-    findings += [*_driver(values, valid, grid), *pedals_move(log, grid.values), *_angle(values, grid, log)]
+    findings += [*_driver(values, valid, grid), *pedals_move(log, grid.values)]
+    findings += steering_findings(values, valid, grid, log)
     absurd = Log({name: log[name] for name in grid.values if name in log}).implausible()
     findings += [Finding("bad" if fault in absurd else "warn", fault) for fault in log.faults]
     order = {"bad": 0, "warn": 1, "ok": 2}
@@ -147,46 +150,6 @@ def _driver(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Gri
                 f"{size:.3g} m/s^2: a wrong unit or scale of torque or pedal, a wrong gear, or another vehicle's parameters",
             ))  # fmt: skip
     return findings
-
-
-def _angle(values: Mapping[str, Array], grid: Grid, log: Log) -> list[Finding]:
-    """What a steering wheel's encoder did that no wheel does, for estimators that tell."""
-    findings = []
-    if "angle_jump" in values and (jumps := int((values["angle_jump"] > 0.5).sum())):
-        findings.append(Finding(
-            "warn", f"the angle jumps {jumps} time{'s' * (jumps > 1)}: encoder, a wrong sample, or a blow; begun anew there",
-             _spans(values["angle_jump"] > 0.5, grid),
-        ))  # fmt: skip
-    if "angle_turns" in values and np.any(values["angle_turns"] != 0):
-        wraps = int((np.diff(values["angle_turns"]) != 0).sum())
-        findings.append(Finding("warn", f"the angle wraps {wraps} times by a turn; taken out"))
-    if "at_end_stop" in values and (share := float((values["at_end_stop"] > 0.5).mean())):
-        findings.append(Finding(
-            "warn", f"the wheel is at its end stop for {share:.1%} of the time: nobody knows what the stop bears",
-            _spans(values["at_end_stop"] > 0.5, grid),
-        ))  # fmt: skip
-    if "angle_jump" in values and "steering_wheel_angle" in grid.values:
-        angle = grid.values["steering_wheel_angle"]
-        rests = _rests_at_its_end(angle[grid.fresh["steering_wheel_angle"]], grid.dt)
-        if rests:
-            findings.append(Finding(
-                "warn", f"the angle rests exactly at its greatest or least value for {rests:.1f} s: a saturated sensor or an end "
-                "stop? The torque there is not the driver's; set steering_end_stop in the vehicle file",
-            ))  # fmt: skip
-    return findings
-
-
-def _rests_at_its_end(angle: Array, dt: float) -> float:
-    """Seconds for which an angle rests at its extremes, in rests of half a second or more, away from where it mostly is."""
-    if angle.size < FEW or not np.ptp(angle) > 0:
-        return 0.0
-    total, middle = 0, float(np.median(angle))
-    for end in (angle.max(), angle.min()):
-        if abs(end - middle) < 0.25 * np.ptp(angle):
-            continue
-        edges = np.flatnonzero(np.diff(np.r_[0, (angle == end).astype(np.int8), 0]))
-        total += sum(int(b - a) for a, b in zip(edges[::2], edges[1::2], strict=True) if (b - a) * dt >= 0.5)
-    return total * dt if total * dt >= 1.0 else 0.0
 
 
 def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid) -> Finding:
@@ -262,7 +225,8 @@ def _row(
         findings.append(Finding("ok", f"{said}; the band is wide for this sensor"))
     else:
         findings.append(Finding("ok", f"{said} (1 is right, less is cautious)"))
-    findings += _spikes(name, row.values[counted])
+    if name != ENCODER:  # its filter has a gate, and tells what it met there
+        findings += _spikes(name, row.values[counted])
     second = max(round(1.0 / grid.dt), 1)
     scattering, leaning, count = blocks(normal, counted, second)
     worst = np.maximum(leaning, scattering)

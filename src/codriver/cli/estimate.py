@@ -153,7 +153,8 @@ def check_with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> C
     if vehicle is None:
         return check
     from codriver.identify import check_vehicle_against_log
-    from codriver.observers.column import friction_unsaid
+    from codriver.measured_torque import sensor_findings
+    from codriver.observers.column import wheel_findings
     from codriver.observers.gears import unknown_gears
 
     said = {f.text for f in check.findings}
@@ -163,7 +164,8 @@ def check_with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> C
         [
             *(replace(f, text=f"vehicle file: {f.text}") for f in found),
             *(unknown_gears(log, vehicle) if "gear" in result.grid.values else []),
-            *(friction_unsaid(vehicle) if "column_torque" in result else []),
+            *(wheel_findings(vehicle, result.provenance) if "column_torque" in result else []),
+            *sensor_findings(result),
             *check.findings,
         ],
         key=lambda f: order[f.severity],

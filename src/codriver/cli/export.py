@@ -41,6 +41,11 @@ def export_c_files(
     observer = build(estimator, car, dt=dt, ell=ell, preset=preset, form=form)
     files = export_c(compile(observer), out, real)
     screen = console()
+    if ESTIMATORS[estimator].learns and preset is None:
+        screen.print(
+            f"the noise is the preset '{ESTIMATORS[estimator].preset}'; one fitted to your own records: codriver tune {estimator}",
+            markup=False,
+        )
     for file in files:
         screen.print(f"wrote {file} ({file.stat().st_size} bytes)", markup=False)
     screen.print(f"check it: make -C {out} check", markup=False)

@@ -18,7 +18,9 @@ Bus = Annotated[int | None, typer.Option("--bus", help="CAN channel to keep; all
 VehicleName = Annotated[
     str | None,
     typer.Option(
-        "--vehicle", help="Built-in name (bisoffi2017, bisoffi2015, renault-zoe) or TOML file.", show_default=False
+        "--vehicle",
+        help="Built-in name (bisoffi2017, bisoffi2015, renault-zoe, okamoto2019, okamoto2019-simulator) or TOML file.",
+        show_default=False,
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Write the summary as JSON to standard output, and nothing else.")]
@@ -35,7 +37,7 @@ PresetName = Annotated[
     typer.Option(
         "--preset",
         help="Noise of a paper, or a preset file (TOML). Default: bisoffi2017 (intent-torque's paper has bisoffi2015); "
-        "driver-torque fits its noise to the log.",
+        "driver-torque fits its noise to the log ('driver' is built in; driver-torque-pi: okamoto2019, okamoto2019-simulator).",
         show_default=False,
     ),
 ]

@@ -47,12 +47,14 @@ class Record:
         torque_from: what the torque is, for people.
         findings: what was wrong with it and could be mended.
         source: of the log.
+        scale_error: standard error of the torque's scale, as a share.
     """
 
     rows: Rows
     torque_from: str
     findings: tuple[Finding, ...]
     source: str
+    scale_error: float = 0.0
 
 
 def steering_record(
@@ -112,7 +114,8 @@ def steering_record(
     if (lost := float((reset & ~end).mean())) > 0.01:
         findings.append(Finding("warn", f"{lost:.1%} of the recording is left out: torque missing or encoder jumps"))
     _refuse_still(rows, name)
-    return Record(rows, " + ".join(chosen), tuple(findings), log.source)
+    scale_error = _scale_error(vehicle) if "steering_motor_command" in chosen else 0.0
+    return Record(rows, " + ".join(chosen), tuple(findings), log.source, scale_error)
 
 
 def mend_angle(signal: Signal) -> tuple[Signal, Array, list[Finding]]:
@@ -181,6 +184,14 @@ def _scale(vehicle: Vehicle | None) -> tuple[float, float]:
             "find it with `codriver identify torque-scale` (weights hung on the wheel), or map steering_motor_torque with a scale",
         )
     return vehicle.number("torque_scale"), vehicle.number("torque_offset") if "torque_offset" in vehicle else 0.0
+
+
+def _scale_error(vehicle: Vehicle | None) -> float:
+    """Standard error of torque_scale, as a share; 0 where nobody gave one."""
+    if vehicle is None or "torque_scale" not in vehicle:
+        return 0.0
+    sd = vehicle.parameters["torque_scale"].sd
+    return abs(float(sd) / vehicle.number("torque_scale")) if isinstance(sd, (int, float)) else 0.0
 
 
 def _refuse_still(rows: Rows, name: str) -> None:

@@ -144,9 +144,19 @@ class SteeringFit:
         return new
 
 
-def coefficients_of(best: Best) -> dict[str, WheelCoefficient]:
-    """The wheel's coefficients with their standard errors; intervals of J_s and b_s are those of their logarithms."""
+# What the filter's steps with friction leave as bias, as a share: docs/steering-identification.md, measured on simulated wheels.
+STEPS = {"J_s": 0.005, "b_s": 0.005, "T_c": 0.014, "T_0": 0.0}
+
+
+def coefficients_of(best: Best, scale_error: float = 0.0) -> dict[str, WheelCoefficient]:
+    """The wheel's coefficients with their standard errors; intervals of J_s and b_s are those of their logarithms.
+
+    Args:
+        best: the fit.
+        scale_error: standard error of the torque's scale, as a share; all coefficients go with it.
+    """
     found = {}
+    rubs = 2 in best.free  # T_c
     for name, letter, unit in zip(
         NAMES[:4], ("J_s", "b_s", "T_c", "T_0"), ("kg*m^2", "N*m*s/rad", "N*m", "N*m"), strict=True
     ):
@@ -155,7 +165,10 @@ def coefficients_of(best: Best) -> dict[str, WheelCoefficient]:
             continue
         k = best.free.index(i)
         model, robust = (float(np.sqrt(max(P[k, k], 0.0))) for P in (best.covariance, best.robust))
-        sd, value = max(model, robust), float(best.theta[i])
+        value = float(best.theta[i])
+        share = float(np.hypot(scale_error, STEPS[letter] if rubs else 0.0))
+        # J_s and b_s are searched as logarithms, so that a share of them adds as it is.
+        sd = float(np.hypot(max(model, robust), share * (1.0 if letter in ("J_s", "b_s") else abs(value))))
         half = 1.959964 * sd
         if letter in ("J_s", "b_s"):
             value = float(np.exp(value))

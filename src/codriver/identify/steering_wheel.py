@@ -31,6 +31,7 @@ from codriver.identify.steering_passes import Passes, algorithm_1
 from codriver.identify.steering_record import Record, steering_record
 from codriver.identify.steering_result import Excitation, SteeringFit, WheelCoefficient, coefficients_of
 from codriver.identify.steering_ukf import joint_ukf
+from codriver.observers.column import USUAL_WHEELS
 from codriver.signals import Grid, Log
 from codriver.signals.signal import Array
 from codriver.vehicles import Vehicle
@@ -81,7 +82,7 @@ def identify_steering_wheel(
     chosen = choose_model(rows, guess, Asked(friction, constant, delay))
     best, rows, late = chosen.best, chosen.rows, chosen.delay
     simulated, r2 = _ahead(rows, best)
-    found, refused = _told(rows, best, r2)
+    found, refused = _told(rows, best, r2, record.scale_error)
     rho, lags = _correlation(rows, best)
     fit = SteeringFit(
         found, refused, _excitation(rows, best), float(np.exp(best.theta[6] / 2)), best.run.nis, lags, rho, r2, late, chosen.stops,
@@ -106,9 +107,11 @@ def _check(preset: str | None, guess: tuple[float, float] | None, delay: float |
         raise UsageError(f"an end stop at {end_stop * 180 / pi:g} deg", "a positive angle", "correct it")
 
 
-def _told(rows: Rows, best: Best, r2: float) -> tuple[dict[str, WheelCoefficient], tuple[Refusal, ...]]:
+def _told(
+    rows: Rows, best: Best, r2: float, scale_error: float
+) -> tuple[dict[str, WheelCoefficient], tuple[Refusal, ...]]:
     """Coefficients that the recording tells, and refusals."""
-    found, refused = coefficients_of(best), []
+    found, refused = coefficients_of(best, scale_error), []
     if not r2 > LEAST_R2:
         share = f"{max(np.nan_to_num(r2), 0.0):.0%} of the angle's changes within {AHEAD:g} s"
         why = f"the torque explains {share}; something else turns the wheel, or holds it"
@@ -223,6 +226,15 @@ def _findings(fit: SteeringFit, record: Record, elsewhere: int) -> list[Finding]
         said.append(
             Finding("warn", f"the torque acts {fit.delay * 1000:.0f} ms late; J_s is that of a wheel with this delay")
         )
+    for letter, low, high, unit in USUAL_WHEELS:
+        if letter in fit.coefficients and not low <= (value := fit.coefficients[letter].value) <= high:
+            said.append(
+                Finding(
+                    "warn",
+                    f"{letter} = {value:.3g} {unit} is unusual (cars and simulators have {low:g} to {high:g}): are the units of "
+                    "angle and torque right?",
+                )
+            )
     said += _halves(fit)
     for letter, c in fit.coefficients.items():
         if letter != "T_0" and not 0.4 < c.sd_robust / max(c.sd_model, 1e-300) < 2.5:

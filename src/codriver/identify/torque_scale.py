@@ -26,6 +26,7 @@ GRAVITY = 9.81  # m/s^2, the paper's
 RADIUS = 0.14  # m, of the paper's wheel
 LEAST = 3  # weighings
 COLUMNS = ("command", "mass", "radius")
+MOST = 100.0  # N m
 SURE = 0.1  # greatest standard error, as a share of the scale
 
 
@@ -89,6 +90,11 @@ def identify_torque_scale(
         raise LogError(
             f"{source}: numbers that are not finite", "command, mass and radius of every weighing", "fill the gaps"
         )
+    if command.size and (most := float(np.abs(torque).max())) > MOST:
+        raise LogError(
+            f"{source}: a weight that makes {most:.4g} N m", f"at most {MOST:g} N m, by far: nobody hangs more on a steering wheel",
+            "give masses in kg and the radius in m",
+        )  # fmt: skip
     n = command.size
     if n < LEAST or np.unique(mass).size < 2 or not np.ptp(command) > 1e-9 * np.abs(command).max():
         raise LogError(

@@ -35,6 +35,10 @@ from codriver.vehicles import Vehicle
 
 WIDTH = 0.2 * pi / 180  # rad, where the vehicle file says nothing
 FRICTION_SD = 0.1  # of T_c, where the vehicle file says nothing
+# What steering wheels of cars and simulators have; trucks, forks and models may well lie outside.
+USUAL_WHEELS = (
+    ("J_s", 0.005, 0.2, "kg m^2"), ("b_s", 0.01, 3.0, "N m s/rad"), ("T_c", 0.0, 2.0, "N m"),
+)  # fmt: skip
 REST = 0.5  # s, in which a resting wheel forgets how it came to rest
 
 
@@ -151,14 +155,29 @@ def friction_of(vehicle: Vehicle, dt: float) -> Friction:
     return Friction(level, sd, width, exp(-dt / REST))
 
 
-def friction_unsaid(vehicle: Vehicle) -> list[Finding]:
-    """A warning where the vehicle file does not say whether the column has friction: it would count as the driver's torque."""
-    if "steering_friction" in vehicle:
-        return []
-    return [Finding(
-        "warn", f"vehicle '{vehicle.name}' has no steering_friction: what friction holds counts as the driver's torque, outside "
-        "the band; codriver identify steering-wheel finds it, 0 says there is none",
-    )]  # fmt: skip
+def wheel_findings(vehicle: Vehicle, settings: Mapping[str, str]) -> list[Finding]:
+    """What a vehicle file leaves open or has unusual of the wheel; an estimate's settings hold J_s and b_s as they were used."""
+    found = []
+    car = "alignment_gain" in vehicle and settings.get("known_torque", "").startswith("map")
+    if "steering_friction" not in vehicle and not car:
+        found.append(Finding(
+            "warn", f"vehicle '{vehicle.name}' has no steering_friction: what friction holds counts as the driver's torque, "
+            "outside the band; codriver identify steering-wheel finds it, 0 says there is none",
+        ))  # fmt: skip
+    if "steering_inertia" not in vehicle:
+        found.append(
+            Finding(
+                "ok", f"J_s = {float(settings['J_s']):g} kg m^2 of a usual car's wheel is assumed: the file has none"
+            )
+        )
+    for letter, low, high, unit in USUAL_WHEELS:
+        value = settings.get(letter) or settings.get({"T_c": "friction"}.get(letter, ""), "nan")
+        if float(value) > high or float(value) < low:
+            usual = f"cars and simulators have {low:g} to {high:g}"
+            found.append(
+                Finding("warn", f"{letter} = {float(value):.3g} {unit} is unusual ({usual}): is it this wheel's?")
+            )
+    return found
 
 
 def car_column(vehicle: Vehicle, dt: float) -> Column:

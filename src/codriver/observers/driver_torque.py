@@ -15,7 +15,8 @@ not depend on the filter's state, only on measured angle, log and vehicle, so th
 so the band holds what the filter, the column and the vehicle file do not know. That part does not average out over time.
 
 * Start: at the first angle, the rest wide. A jump of the encoder, or an innovation beyond GATE standard deviations and a degree,
-  starts the filter anew from the new angle and is told by `angle_jump`; wraps are taken out (`angle_row`).
+  starts the filter anew from the new angle, at rest and wide, and is told by `angle_jump`; so does a gap of over half a second,
+  without being told. Wraps are taken out (`angle_row`).
 * T_k missing: what is known of T_dr is forgotten, and `inputs_known` is 0.
 * `valid`: T_k is known, the wheel is not at its end stop, and P_qq is at most SETTLED times the stationary one, or SURE^2.
 """
@@ -93,14 +94,15 @@ def driver_torque_observer(
         predicted = predict(kalman, unpack(carry, n), [before], [turning * torque])
         e = row.angle - predicted.x[0]
         gate = GATE**2 * (predicted.P[0][0] + kalman.R[0])
-        beyond = both(both(row.fresh, both(carry["begun"], e * e > gate)), e * e > LEAST_GATE**2)
-        anew = either(row.first, either(row.jumped, beyond))
-        use = both(row.fresh, both(row.memory["begun"], negate(anew)))
+        beyond = both(both(row.fresh, both(carry["angle_begun"], e * e > gate)), e * e > LEAST_GATE**2)
+        jump = either(row.jumped, beyond)
+        anew = either(row.first, either(jump, row.resumed))
+        use = both(row.fresh, both(row.memory["angle_begun"], negate(anew)))
         now, (told,) = update(kalman, predicted, [row.angle], [use], [turning * torque])
-        restart = [row.angle, select(row.first, 0.0, predicted.x[1]), *predicted.x[2:]]
-        now = chosen(anew, started(kalman, restart), now)
+        # From rest: what was extrapolated over a gap or through a jump would lead away again.
+        now = chosen(anew, started(kalman, [row.angle, *([0.0] * (n - 1))]), now)
         now = forget(now, negate(moment.known), wide, range(2, n))
-        begun = row.memory["begun"]
+        begun = row.memory["angle_begun"]
         # Before the first angle nothing is known, and nothing moves.
         now = chosen(begun, now, started(kalman, [0.0] * n))
         valid = both(both(begun, moment.known), both(negate(row.stopped), now.P[2][2] <= limit))
@@ -114,7 +116,8 @@ def driver_torque_observer(
             "driver_torque_sd": sqrt(now.P[2][2] + more), "column_torque": torque,
             "steering_wheel_angle_innovation": select(use, told.e, 0.0),
             "steering_wheel_angle_innovation_sd": sqrt(told.s), "steering_wheel_angle_used": use,
-            "angle_turns": row.turns, "angle_jump": both(anew, negate(row.first)), "inputs_known": moment.known,
+            "angle_turns": row.turns, "angle_jump": both(jump, negate(either(row.first, row.resumed))), "restarted": anew,
+            "inputs_known": moment.known,
             "at_end_stop": row.stopped, "valid": valid,
         }  # fmt: skip
         return new, out
@@ -176,6 +179,7 @@ OUTPUTS = (
     Output(f"{ANGLE}_innovation_sd", "rad", "innovation_sd", "standard deviation of the innovation"),
     Output(f"{ANGLE}_used", "1", "flag", "1 where an angle was used"),
     Output("angle_jump", "1", "flag", "1 where the angle jumped and the filter started anew"),
+    Output("restarted", "1", "flag", "1 where the filter started anew: first angle, jump, or after a gap"),
     Output("at_end_stop", "1", "flag", "1 beyond the end stop of the vehicle file"),
     Output("inputs_known", "1", "flag", "1 where all that acts on the column is known"),
     Output("valid", "1", "flag", "1 where the model holds, the inputs are known and the estimate has settled"),

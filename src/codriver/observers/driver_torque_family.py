@@ -26,6 +26,7 @@ from codriver.models.alignment import USUAL
 from codriver.observers.column import Column, assist_column, car_column, logged_column, single_track_column
 from codriver.observers.driver_torque import driver_torque_observer
 from codriver.observers.hands import HandsSettings, hands_observer
+from codriver.observers.mended_angle import with_mended_angle
 from codriver.observers.observer import Observer, chain
 from codriver.observers.pi import pi_observer
 from codriver.observers.pi_weights import DEGREES, PIWeights, find_pi_weights, wheel_pi_design
@@ -97,7 +98,7 @@ def _pi(vehicle: Vehicle | None, design: Design) -> Observer:
     weights: PIWeights = design.preset
     made = wheel_pi_design(vehicle.number("steering_inertia"), vehicle.number("steering_damping"), weights)
     settings = {"vehicle": vehicle.name, "known_torque": "alignment_torque", "inputs": weights.inputs}
-    return pi_observer(made, design.dt, scales=[DEGREES], inputs=weights.inputs, settings=settings)
+    return with_mended_angle(pi_observer(made, design.dt, scales=[DEGREES], inputs=weights.inputs, settings=settings))
 
 
 SOURCES = (

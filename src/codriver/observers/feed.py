@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from codriver.errors import MissingSignal, UsageError
+from codriver.errors import MissingSignal, UsageError, VehicleError
 from codriver.observers.registry import ESTIMATORS, families, needed_signals
 from codriver.signals import Log
 from codriver.vehicles import Vehicle
@@ -77,6 +77,7 @@ def best(signals: Collection[str], vehicle: Vehicle | None, where: str = "the lo
 
     Raises:
         MissingSignal: none can; the message says what each lacks.
+        VehicleError: the log has what one needs, and the vehicle lacks a parameter.
         UsageError: there is no such family.
     """
     found = feeds(signals, vehicle, family)
@@ -84,6 +85,14 @@ def best(signals: Collection[str], vehicle: Vehicle | None, where: str = "the lo
         if feed.possible:
             return feed
     lacks = "; ".join(f"{f.estimator} lacks {f.lacks(vehicle)}" for f in found)
+    fed = [f for f in found if not f.missing and not any(p.startswith("no ") for p in f.lacking)]
+    if fed and vehicle is not None:
+        nearest_one = min(fed, key=lambda f: len(f.lacking))
+        raise VehicleError(
+            f"{where} feeds no estimator with vehicle '{vehicle.name}': {lacks}",
+            f"{', '.join(nearest_one.lacking)} in the vehicle file, for {nearest_one.estimator}",
+            "find them with `codriver identify`, or add them to the file: docs/vehicles.md",
+        )
     least = least_demanding(family)
     raise MissingSignal(
         f"{where} feeds no estimator: {lacks}",

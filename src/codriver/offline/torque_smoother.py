@@ -4,9 +4,9 @@
     fixed lag        x_k | the angles up to k + lag
 
 The compiled observer runs first and as it is; then the passes go over its means and covariances (`passes`). They do not look
-across a jump of the encoder, nor across a stretch in which the torque on the column is missing: there the filter's values
-stay. What the vehicle file and the column leave open is added to the variance as the filter adds it; hindsight tells nothing of
-it. Innovations and other flags are the filter's.
+across a jump of the encoder or a gap after which the filter began anew, nor across a stretch in which the torque on the column is
+missing: there the filter's values stay. What the vehicle file and the column leave open is added to the variance as the filter
+adds it; hindsight tells nothing of it. Innovations and other flags are the filter's.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ def smooth_torque(observer: Observer, log: Log, lag: float | None) -> SmoothedEs
     """
     size = sum(key.startswith("x_") for key in observer.carry)
     means, covariances = [f"x_{i}" for i in range(size)], [f"P_{i}{j}" for i, j in pairs(size)]
-    run = compile(with_memory(observer, [*means, *covariances, "begun"])).run(log)
+    run = compile(with_memory(observer, [*means, *covariances, "angle_begun"])).run(log)
     columns, n, dt = dict(run.columns), len(run.grid), run.grid.dt
-    begun = columns.pop("begun") > 0.5
+    begun = columns.pop("angle_begun") > 0.5
     known = run.flag("inputs_known") & begun
     names = Names(size)
     memory = {name: columns.pop(name) for name in (*means, *covariances)}
@@ -53,7 +53,7 @@ def smooth_torque(observer: Observer, log: Log, lag: float | None) -> SmoothedEs
     after = np.append(torque[1:], torque[-1:])
     F, G_0, G_1, Q_d = (observer.gains[letter] for letter in ("F", "G_0", "G_1", "Q_d"))
     filtered |= {name: G_0[i, 0] * torque + G_1[i, 0] * after for i, name in enumerate(names.shift)}
-    follows = np.append(known[1:] & ~run.flag("angle_jump")[1:], False)
+    follows = np.append(known[1:] & ~run.flag("restarted")[1:], False)
     filtered["wall"] = 1.0 - (known & follows)
     ticks = n if lag is None else round(lag / dt)
     if ticks:
