@@ -15,7 +15,7 @@ from codriver.torque_fit import fit_torque_noise
 from codriver.vehicles import Vehicle
 
 RATES = (1.0, 10000.0)  # Hz
-LONG = 420  # characters of what better estimators lack; beyond, they are counted
+LONG = 350  # characters of what better estimators lack; beyond, they are counted
 
 
 def choose(name: str, log: Log, vehicle: Vehicle | None = None) -> tuple[str, str]:

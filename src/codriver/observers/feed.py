@@ -85,7 +85,8 @@ def best(signals: Collection[str], vehicle: Vehicle | None, where: str = "the lo
         if feed.possible:
             return feed
     lacks = "; ".join(f"{f.estimator} lacks {f.lacks(vehicle)}" for f in found)
-    fed = [f for f in found if not f.missing and not any(p.startswith("no ") for p in f.lacking)]
+    # Those that lack little: a whole single track is no hint, nor is a parameter that stands in the way.
+    fed = [f for f in found if not f.missing and len(f.lacking) <= MANY and not any(p[:3] == "no " for p in f.lacking)]
     if fed and vehicle is not None:
         nearest_one = min(fed, key=lambda f: len(f.lacking))
         raise VehicleError(
