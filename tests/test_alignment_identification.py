@@ -153,8 +153,34 @@ class TestRefusals:
         assert "T_s" in {r.name for r in fit.refused}
 
     def test_straight_road(self):
-        with pytest.raises(cd.errors.LogError, match="curves"):
+        with pytest.raises(cd.errors.LogError, match="record drives with curves"):
             identify_alignment([made_drive(7, curves=0.0)])
+
+    @pytest.mark.parametrize(
+        ("name", "factor", "said"),
+        [
+            ("steering_wheel_angle", np.pi / 180, "curves, the angle is likely in rad where the names file says deg"),
+            ("longitudinal_speed", 1 / 3.6, "curves, the speed is likely in m/s where the names file says km/h"),
+        ],
+    )
+    def test_curves_in_another_unit(self, made, name, factor, said):
+        """They look straight; the unit is told, not that curves are missing."""
+        with pytest.raises(cd.errors.LogError, match=said) as refused:
+            identify_alignment([scaled(made[0], name, factor)])
+        assert "s of curves" in str(refused.value)
+        assert "record drives with curves" not in str(refused.value)
+
+    def test_town_in_kmh(self):
+        with pytest.raises(cd.errors.LogError, match="km/h"):
+            identify_alignment([scaled(made_drive(4, steady=20.0), "longitudinal_speed", 3.6)])
+
+    def test_degrees_out_of_range(self):
+        """As a reader leaves them: what cannot be an angle in rad is no number."""
+        log = scaled(made_drive(8, seconds=60.0), "steering_wheel_angle", 180 / np.pi)
+        angle = log["steering_wheel_angle"]
+        left = np.where(np.abs(angle.values) > 20, np.nan, angle.values)
+        with pytest.raises(cd.errors.LogError, match=r"out of range.*likely degrees"):
+            identify_alignment([log.with_signals(cd.Signal(angle.name, angle.time, left, "rad"))])
 
     def test_degrees_for_radians(self, made):
         with pytest.raises(cd.errors.LogError, match="degrees"):

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -172,7 +173,7 @@ class TestInfo:
         told = run(
             "info", demo_files.log, "--dbc", demo_files.dbc, "--names", tmp_path / "begun.toml", "--json"
         ).summary
-        assert [s["name"] for s in told["signals"]] == ["longitudinal_speed"]
+        assert [s["name"] for s in told["signals"]] == ["longitudinal_speed", "steering_wheel_angle"]
 
     def test_a_flag_is_no_speed(self, run, tmp_path):
         """Called a speed, and a flag, a limit, an accuracy: the channel with values is proposed, its flag beside it."""
@@ -851,3 +852,54 @@ def test_a_loggers_abbreviation_is_proposed(run, demo_files):
     """The demo's logger calls the speed VehSpd."""
     ran = run("info", demo_files.logger)
     assert 'source = "VehSpd"' in ran.out
+
+
+SINE = np.sin(np.arange(600) / 50)
+NOISE = np.random.default_rng(0).standard_normal(600)
+
+
+@pytest.mark.parametrize(
+    ("columns", "proposed"),
+    [
+        (
+            {"WheelAngle": 30 * SINE, "FFB_Cmd": SINE / 5, "Speed": 20 + 0 * SINE},
+            {"longitudinal_speed": ("Speed", "km/h"), "steering_wheel_angle": ("WheelAngle", "deg"),
+             "steering_motor_command": ("FFB_Cmd", "1")},
+        ),
+        (
+            {"SteeringWheelAngle": 3 * SINE, "SteerTorque": NOISE, "VehicleSpeed": 20 + SINE, "EPS_Motor_Torque": 2 * NOISE,
+             "AlignTorque": 3 * SINE, "SteeringWheelAngleRate": NOISE, "SteerTorqueValid": SINE > 0, "EngineTorque": 30 * SINE},
+            {"longitudinal_speed": ("VehicleSpeed", "km/h"), "steering_wheel_angle": ("SteeringWheelAngle", "rad"),
+             "steering_wheel_torque": ("SteerTorque", "N*m"), "steering_motor_torque": ("EPS_Motor_Torque", "N*m"),
+             "alignment_torque": ("AlignTorque", "N*m")},
+        ),
+        (
+            {"Lenkradwinkel [deg]": 3 * SINE, "Lenkmoment": NOISE, "Geschwindigkeit": 20 + SINE},
+            {"longitudinal_speed": ("Geschwindigkeit", "km/h"), "steering_wheel_angle": ("Lenkradwinkel [deg]", "deg"),
+             "steering_wheel_torque": ("Lenkmoment", "N*m")},
+        ),
+        (
+            {"steering_angle": 3 * SINE, "torque": NOISE, "speed": 20 + SINE},
+            {"longitudinal_speed": ("speed", "km/h"), "steering_wheel_angle": ("steering_angle", "rad"),
+             "steering_wheel_torque": ("torque", "N*m")},
+        ),
+        (  # a torque of the powertrain, a wheel of the car, a target, a flag, a raw count
+            {"steering_angle_target": 3 * SINE, "steering_angle": 30 * SINE, "torque": NOISE, "motor_torque": NOISE,
+             "engine_rpm": 900 + SINE, "wheel_angle_fl": NOISE, "SteerTorque": SINE > 0, "EPS_Torque": 2000 + 500 * SINE,
+             "Speed": 9 + SINE},
+            {"longitudinal_speed": ("Speed", "km/h"), "steering_wheel_angle": ("steering_angle", "deg")},
+        ),
+    ],
+)  # fmt: skip
+def test_the_steering_is_proposed(run, tmp_path, columns, proposed):
+    """By name, unit and values, never a flag; and what is proposed is a names file that works."""
+    log = csv(tmp_path / "d.csv", {"time": np.arange(600) / 50, **columns})
+    text = run("info", log, "--json").summary["names_file_begins"]
+    told = {name: (entry["source"], entry["unit"]) for name, entry in tomllib.loads(text).items()}
+    assert told == proposed
+    (tmp_path / "n.toml").write_text(text)
+    signals = run("info", log, "--names", tmp_path / "n.toml", "--json").summary["signals"]
+    assert {s["name"] for s in signals} == set(proposed)
+    for line in text.splitlines():
+        if line.startswith('unit = "deg"') and "[deg]" not in text:
+            assert line.endswith("the recording says none: 30 cannot be rad")

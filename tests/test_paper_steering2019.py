@@ -13,7 +13,7 @@ from codriver.papers.steering2019.consistency import NOISES, bounds, judge_consi
 from codriver.papers.steering2019.design import design_chapter
 from codriver.papers.steering2019.drive import drive_chapter, told
 from codriver.papers.steering2019.filters import LIMITS, compare_filters, pi_in_numpy, records_of
-from codriver.papers.steering2019.identification import identification_chapter
+from codriver.papers.steering2019.identification import identification_chapter, quicker
 from codriver.papers.steering2019.recorded import recorded_chapters
 from codriver.papers.steering2019.robustness import robustness_chapter
 from codriver.papers.steering2019.runs import B_S, DT, J_S, driven_runs, rmse, run_all
@@ -82,6 +82,11 @@ class TestPieces:
         assert records.driver.shape == records.angle.shape == (2, 1501)
         assert records.driver.std() > 0.3
         assert not np.array_equal(records.driver[0], records.driver[1])
+
+    def test_quicker_in_words(self):
+        """Times to 20, 10 and 5 %."""
+        assert quicker(np.array([1.2, 2.7, 5.1]), np.array([0.3, 2.6, 7.4])) == "slower to 20 and 10 %, quicker to 5 %"
+        assert quicker(np.ones(3), 2 * np.ones(3)) == "quicker to 20, 10 and 5 %"
 
     def test_bounds_are_those_of_the_mean(self):
         """Against a normal approximation, which 200 x 3 degrees of freedom are close to."""
@@ -317,4 +322,8 @@ def test_the_command_writes_both_files(tmp_path, capsys):
             main()
     assert done.value.code in (0, None)
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == ["steering2019.html", "steering2019.json"]
-    assert "does not hold: (64)-(65)" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "does not hold: (64)-(65)" in said
+    assert "paper: None" not in said
+    assert said.index("of the paper: ") < said.index("does not hold: (64)-(65)") < said.index("beside it: ")
+    assert "slower to 20 and 10 %, quicker to 5 %: " in said

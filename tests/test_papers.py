@@ -7,7 +7,7 @@ import pytest
 
 from codriver.errors import UsageError
 from codriver.papers import reproduce
-from codriver.papers.item import Item, near
+from codriver.papers.item import Item, counts, near
 from codriver.papers.jerk2015.zoe import zoe_chapter
 from codriver.papers.jerk2017.performance import in_order
 from codriver.papers.jerk_design import Places, design_chapter
@@ -36,8 +36,25 @@ def test_files_hold_every_item(tmp_path):
     assert [item["holds"] for item in read["items"]] == [True, False, None]
     assert read["items"][1]["ours"] is None  # JSON has no NaN
     text = page.read_text(encoding="utf-8")
-    assert text.count("does not hold") == 3  # the fact, and the item in its chapter and in the summary
+    assert text.count("does not hold") == 3  # the heading, and the item in its chapter and in the summary
+    assert "2: 1 hold, 1 do not, 0 cannot be judged here" in text
+    assert "1: 0 hold, 0 do not, 1 cannot be judged here" in text
     assert "words &amp; &lt;more&gt;" in text
+
+
+def test_what_the_paper_says_is_told_apart_from_ours(tmp_path):
+    items = (
+        Item("said", "fast", "slow", "", False, ""),
+        Item("a goal", None, 2.0, "1", False, ""),
+        Item("another", None, 1.0, "1", True, ""),
+    )
+    made = Reproduction("toy", "A toy", "nobody 2000", "lead", (Chapter("One", (), (), items),))
+    assert made.of_paper == items[:1]
+    assert made.beside == items[1:]
+    assert counts(made.beside) == "1 hold, 1 do not, 0 cannot be judged here"
+    text = made.write(tmp_path)[0].read_text(encoding="utf-8")
+    summary = text[text.index("What does not hold") :]
+    assert summary.index("said") < summary.index("Beside it") < summary.index("a goal") < summary.index("another")
 
 
 def test_bursts_in_order():

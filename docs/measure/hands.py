@@ -1,7 +1,7 @@
 """Figures of docs/hands.md: python docs/measure/hands.py [DRIVES]      10 min each; 12 drives a row by default
 
 python docs/measure/hands.py fit          finds the defaults of HandsSettings again, on drives of other seeds; some minutes
-python docs/measure/hands.py recorded     the two recorded columns
+python docs/measure/hands.py recorded FOLDER     the two recorded columns, with comma2k19-rav4 and iracing in FOLDER
 """
 
 # ruff: noqa: T201
@@ -195,9 +195,15 @@ def main(drives: int) -> None:
     print("\n" + table(["drive", *head[1:], "log loss of the share"], rows))
 
 
-def recorded() -> None:
-    """Driver torque and hands in the assisted car; shaft torque in the simulator."""
-    root = Path(__file__).parents[2]
+def recorded(data: Path) -> None:
+    """Driver torque and hands in the assisted car; shaft torque in the simulator.
+
+    Args:
+        data: folder that holds the recordings.
+    """
+    lacking = [name for name in ("comma2k19-rav4", "iracing/amg.ibt") if not (data / name).exists()]
+    if lacking:
+        sys.exit(f"{data} lacks {', '.join(lacking)}: give the folder of recordings, hands.py recorded FOLDER")
     from codriver.papers.steering2019.recorded_column import (
         assisted_column,
         brush,
@@ -209,7 +215,6 @@ def recorded() -> None:
         shaft,
     )
 
-    data = root.parent / "shared" / "data"
     car = assisted_column(data / "comma2k19-rav4")
     on, rows = car.span(0, 8.9), []
     for begin, end, first, last in ((13, 40, 40, 59), (35, 59, 13, 35)):
@@ -250,4 +255,11 @@ def recorded() -> None:
 
 if __name__ == "__main__":
     what = sys.argv[1] if len(sys.argv) > 1 else "12"
-    {"fit": fit, "recorded": recorded}.get(what, lambda: main(int(what)))()
+    if what == "recorded":
+        if len(sys.argv) < 3:
+            sys.exit("hands.py recorded needs the folder that holds the recordings: hands.py recorded FOLDER")
+        recorded(Path(sys.argv[2]))
+    elif what == "fit":
+        fit()
+    else:
+        main(int(what))

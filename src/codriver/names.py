@@ -128,7 +128,15 @@ _ENTRIES = (
         -2000,
         2000,
     ),
-    Quantity("alignment_torque", "N*m", "N*m", "T_aln", "torque of the tyres on the steering column", -300, 300),
+    Quantity(
+        "alignment_torque",
+        "N*m",
+        "N*m",
+        "T_aln",
+        "torque of the tyres on the steering column, positive to the left",
+        -300,
+        300,
+    ),
     Quantity(
         "column_torque",
         "N*m",

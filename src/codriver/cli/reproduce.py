@@ -42,23 +42,21 @@ def _make(papers: list[str], out: Path, recordings: Path, quick: bool) -> None:
     """Each paper in turn, written as soon as it is made."""
     from codriver.cli.terminal import command_line, console, working
     from codriver.papers import reproduce as make
+    from codriver.papers.item import counts
 
     screen = console()
     for name in papers:
         with working(True, 3) as stage:
             made = make(name, stage, quick=quick, recordings=recordings)
         page, data = made.write(out, command_line())
-        counts = {v: sum(i.holds is v for i in made.items) for v in (True, False, None)}
-        screen.print(
-            f"{name}: {len(made.items)} items, {counts[True]} hold, {counts[False]} do not, {counts[None]} cannot be judged here",
-            markup=False,
-        )
-        for item in made.items:
-            if item.holds is False:
-                screen.print(
-                    f"  does not hold: {item.item} (paper: {item.paper}, ours: {_said(item.ours)} {item.unit})",
-                    markup=False,
-                )
+        screen.print(f"{name}: {len(made.items)} items", markup=False)
+        for where, items in (("of the paper", made.of_paper), ("beside it", made.beside)):
+            screen.print(f"  {where}: {counts(items)}", markup=False)
+            for item in items:
+                if item.holds is False:
+                    said = "" if item.own else f"paper: {item.paper}, "
+                    ours = f"{_said(item.ours)} {item.unit if item.unit != '1' else ''}".rstrip()
+                    screen.print(f"    does not hold: {item.item} ({said}ours: {ours})", markup=False)
         screen.print(f"wrote {page} and {data}", markup=False)
 
 

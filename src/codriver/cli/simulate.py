@@ -67,6 +67,7 @@ def rig(out: Out, seed: Seed = 0, duration: Duration = None, overwrite: Overwrit
 
     from codriver.cli.terminal import console
     from codriver.errors import UsageError
+    from codriver.identify.regression import rms
     from codriver.simulate.folder import refuse_foreign
     from codriver.simulate.rig import RigSetting
     from codriver.simulate.rig_files import FILES, write_rig
@@ -83,7 +84,7 @@ def rig(out: Out, seed: Seed = 0, duration: Duration = None, overwrite: Overwrit
     console().print(
         f"a force-feedback wheel: J_s {wheel.inertia:g} kg m^2, b_s {wheel.damping:g} N m s/rad, T_c {wheel.friction:g} N m, "
         f"torque {setting.torque_scale:g} command + {setting.torque_offset:g} N m\n"
-        f"{drive.time[-1]:.0f} s at {setting.car.speed * 3.6:.0f} km/h, driver's torque {torque.std():.2f} N m (rms), seed {seed}\n"
+        f"{drive.time[-1]:.0f} s at {setting.car.speed * 3.6:.0f} km/h, driver's torque {rms(torque):.2f} N m (rms), seed {seed}\n"
         f"wrote {', '.join(str(p) for p in vars(files).values())}\n\n"
         f"then: codriver identify torque-scale {files.weights} -o {out / 'scale.toml'}\n"
         f"      codriver identify steering-wheel {files.chirp} --names {files.names} --vehicle {out / 'scale.toml'} "

@@ -36,7 +36,9 @@ Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a preset f
 Rate = Annotated[
     float | None, typer.Option("--rate", help="Ticks per second. Default: from the logs.", show_default=False)
 ]
-Report = Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)]
+Report = Annotated[
+    Path | None, typer.Option("--report", help="Report to write (HTML); for the intent estimators.", show_default=False)
+]
 
 
 def tune(

@@ -19,7 +19,16 @@ import numpy as np
 
 from codriver.errors import LogError, UsageError
 from codriver.finding import Finding
-from codriver.identify.alignment_drive import MOTOR, TORQUE, TORQUES, TURNS, Drive, alignment_drive, refuse_sign
+from codriver.identify.alignment_drive import (
+    MOTOR,
+    TORQUE,
+    TORQUES,
+    TURNS,
+    Drive,
+    alignment_drive,
+    other_unit,
+    refuse_sign,
+)
 from codriver.identify.alignment_fit import LETTERS, NO_BEND, WHOLE, fit_told, modelled
 from codriver.identify.alignment_holdout import HoldOut, hold_out
 from codriver.identify.alignment_result import AlignmentFit, coefficients_of
@@ -77,12 +86,12 @@ def identify_alignment(
     drives = [alignment_drive(log, start, rate, by) for log in logs]
     source = ", ".join(Path(d.source).name or f"drive {k + 1}" for k, d in enumerate(drives))
     refuse_sign(drives)
-    _refuse_straight(drives, source)
+    _refuse_straight(drives, source, start)
     fit, lost = fit_told([(d, d.keep) for d in drives], start, letters)
     if "k_a" in lost:
         raise LogError(
             f"{source}: torque does not follow the curves", "curves in which the torque rises with lateral acceleration",
-            f"check that {by} is the torque that turns the wheel, and its clock that of the angle",
+            f"check that {by} is the torque that turns the wheel, its clock that of the angle, and the units of angle and speed",
         )  # fmt: skip
     coefficients = coefficients_of(fit)
     for letter, found in coefficients.items():
@@ -100,13 +109,13 @@ def identify_alignment(
     )  # fmt: skip
 
 
-def _refuse_straight(drives: Sequence[Drive], source: str) -> None:
-    """Raises: LogError: there are hardly any curves."""
+def _refuse_straight(drives: Sequence[Drive], source: str, model: AlignmentModel) -> None:
+    """Raises: LogError: there are hardly any curves, or they are in another unit."""
     turning = sum(float((d.keep & (np.abs(d.lateral) > TURNS)).sum()) * d.dt for d in drives)
     if turning < LEAST_TURNING:
         raise LogError(
             f"{source}: {turning:.1f} s of curves with more than {TURNS:g} m/s^2", f"at least {LEAST_TURNING:g} s, by far",
-            "record drives with curves; a straight road tells friction alone",
+            other_unit(drives, model, LEAST_TURNING) or "record drives with curves; a straight road tells friction alone",
         )  # fmt: skip
 
 

@@ -29,7 +29,9 @@ SLOWEST = 1.0  # m/s
 LEAST_SECONDS = 30.0
 MOST_LATERAL = 12.0  # m/s^2, no car on a road has more
 TURNS = 0.3  # m/s^2, from which on a car counts as cornering
-MOST_SPEED = 80.0  # m/s
+MOST_SPEED = 60.0  # m/s, in nineteen parts of twenty
+GAINS = (0.5, 5.0)  # N m per m/s^2, of a usual car's column
+MOST_LOST = 0.05  # of a signal's samples; more without a number point to another unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +105,7 @@ def alignment_drive(log: Log, model: AlignmentModel, rate: float | None = None, 
     if keep.sum() * dt < LEAST_SECONDS:
         raise LogError(
             f"{name}: {keep.sum() * dt:.0f} s of driving with angle, speed and torque", f"at least {LEAST_SECONDS:g} s",
-            "record a longer drive, with curves at several speeds",
+            _lost(log, signals) or "record a longer drive, with curves at several speeds",
         )  # fmt: skip
     angle, speed, torque = (_filled(x) for x in (angle, speed, torque))
     lateral = speed * speed * model.curvature(angle, speed)
@@ -112,6 +114,49 @@ def alignment_drive(log: Log, model: AlignmentModel, rate: float | None = None, 
     return Drive(
         log.source, dt, grid.time, angle, _slope(angle, dt), speed, torque, lateral, curvature, pace, np.asarray(keep)
     )
+
+
+def _lost(log: Log, names: Sequence[str]) -> str | None:
+    """What is to do where samples of a signal are no numbers, as those out of its range become."""
+    shares = {name: float(np.mean(~np.isfinite(log[name].values))) for name in names}
+    name = max(shares, key=lambda n: shares[n])
+    if shares[name] < MOST_LOST:
+        return None
+    unit = {ANGLE: "degrees", SPEED: "km/h"}.get(name)
+    return (
+        f"{shares[name]:.0%} of the samples of {name} are missing or out of range: check its unit in the names file"
+        + (f"; it is likely {unit}" if unit else "")
+    )
+
+
+def other_unit(drives: Sequence[Drive], model: AlignmentModel, least: float) -> str | None:
+    """What is to do where drives that look straight hold curves of an ordinary size, and an ordinary torque, in another unit.
+
+    Args:
+        drives: with less than `least` of curves.
+        model: its geometry counts.
+        least: s of curves that an ordinary drive has.
+    """
+    angle, speed, torque = (
+        np.concatenate([getattr(d, n)[d.keep] for d in drives]) for n in ("angle", "speed", "torque")
+    )
+    seconds = np.concatenate([np.full(int(d.keep.sum()), d.dt) for d in drives])
+
+    def ordinary(angle: Array, speed: Array) -> bool:
+        lateral = speed * speed * model.curvature(angle, speed)
+        if seconds[np.abs(lateral) > TURNS].sum() < least:
+            return False
+        # Friction and corrections on a straight road make a torque, too, but a small one for such curves.
+        gain = np.cov(lateral, torque)[0, 1] / np.var(lateral)
+        slow = np.percentile(speed, 95) <= MOST_SPEED and np.percentile(np.abs(lateral), 98) <= MOST_LATERAL
+        return bool(slow and GAINS[0] < gain < GAINS[1])
+
+    likely = []
+    if ordinary(angle * 180 / np.pi, speed):
+        likely.append("the angle is likely in rad where the names file says deg")
+    if ordinary(angle, 3.6 * speed):
+        likely.append("the speed is likely in m/s where the names file says km/h")
+    return f"if the drives hold curves, {', or '.join(likely)}; if not, record some" if likely else None
 
 
 def refuse_sign(drives: Sequence[Drive]) -> None:

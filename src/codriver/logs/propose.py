@@ -1,7 +1,8 @@
-"""The beginning of a names file for a recording that nobody has mapped: which channel is likely the vehicle's speed.
+"""The beginning of a names file for a recording that nobody has mapped: the vehicle's speed, and what is seen of the steering.
 
 A channel counts by its name, its unit and its values together: a flag such as "SpeedValid" or a limit is called a speed too,
-but shows one or two values. A flag that belongs to the channel chosen is proposed as its `valid`.
+but shows one or two values. One that is called "Speed" and nothing else may rest, as a driving simulator's does. A flag
+that belongs to the channel chosen is proposed as its `valid`.
 """
 
 from __future__ import annotations
@@ -11,32 +12,36 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from codriver.errors import UnitError
+from codriver.logs.propose_steering import propose_steering
+from codriver.logs.proposed import MOST_LOADED, in_range, is_value, measures, table_of
 from codriver.logs.recording import RawSignal, Recording, SourceChannel
-from codriver.names import VOCABULARY
 from codriver.toml_file import quoted
-from codriver.units import to_si
 
 NAME = "longitudinal_speed"
 _CALLED = re.compile(r"speed|spd|veloc|geschwindigkeit|vitesse", re.IGNORECASE)
 _OTHER = re.compile(
-    r"accel|engine|eng_?spd|motor|turbine|fan|wind|accura|limit|cruise|target|desired|setpoint|lateral|valid|turn|yaw|steer",
+    r"accel|engine|eng_?spd|motor|turbine|fan|(?<!sch)wind|accura|limit|cruise|target|desired|setpoint|lateral|valid|turn|yaw|steer",
     re.IGNORECASE,
 )
 _FLAG = re.compile(r"valid|ready", re.IGNORECASE)
-LEAST_VALUES = 10  # different ones; a flag or a limit has fewer
-MOST_LOADED = 40  # channels looked into
+_PLAIN = re.compile(r"^((vehicle|car)[_ ]?)?(speed|velocity|geschwindigkeit)(?=$|\W)", re.IGNORECASE)
 
 
 def propose_names(recording: Recording) -> str:
-    """The text of a names file that maps the speed, for people to check and go on from."""
+    """The text of a names file that maps speed and steering, for people to check and go on from."""
+    return "\n".join((_propose_speed(recording), *propose_steering(recording)))
+
+
+def _propose_speed(recording: Recording) -> str:
+    """The speed's table, or one to fill in."""
     channels = recording.channels()
     called = sorted((c for c in channels.values() if _rank(c) >= 0), key=_rank, reverse=True)[:MOST_LOADED]
     loaded = recording.load([channel.name for channel in called])
-    for channel in called:
-        raw = loaded.get(channel.name)
-        if raw is not None and _is_value(channel, raw):
-            return _entry(channel, raw, _companion(recording, channel))
+    there = [(channel, loaded[channel.name]) for channel in called if channel.name in loaded]
+    for accepted in (_varies, _rests):
+        for channel, raw in there:
+            if accepted(channel, raw):
+                return _entry(channel, raw, _companion(recording, channel))
     return (
         f"# none of the channels looks like the vehicle's speed: which one is it?\n[{NAME}]\n"
         'source = "name of the channel"\nunit = "km/h"\n'
@@ -45,32 +50,23 @@ def propose_names(recording: Recording) -> str:
 
 def _rank(channel: SourceChannel) -> int:
     """How likely a channel is the speed, by name and unit; below 0 if it is not."""
-    known = _measures_speed(channel.unit)
+    known = measures(channel.unit, NAME)
     if (channel.unit and not known) or _OTHER.search(channel.name) or not (known or _CALLED.search(channel.name)):
         return -1
     name = channel.name.lower()
     return 4 * known + 2 * (_CALLED.search(name) is not None) + ("veh" in name) - ("wheel" in name or "whl" in name)
 
 
-def _measures_speed(unit: str) -> bool:
-    """Whether a unit is one of speed."""
-    try:
-        to_si(unit, VOCABULARY[NAME].unit)
-    except UnitError:
-        return False
-    return bool(unit)
+def _varies(channel: SourceChannel, raw: RawSignal) -> bool:
+    """Whether the samples are those of a measured speed. Without a unit the values may be in km/h."""
+    return is_value(NAME, channel.unit or "km/h", raw)
 
 
-def _is_value(channel: SourceChannel, raw: RawSignal) -> bool:
-    """Whether the samples are those of a measured speed: many different values, nearly all of them in range."""
-    finite = raw.values[np.isfinite(raw.values)]
-    if np.unique(finite).size < LEAST_VALUES:
-        return False
-    entry = VOCABULARY[NAME]
-    # Without a unit the values may be in km/h.
-    factor = to_si(channel.unit or "km/h", entry.unit)[0]
-    outside = (factor * finite < entry.low) | (factor * finite > entry.high)
-    return bool(np.mean(outside) < 0.01)
+def _rests(channel: SourceChannel, raw: RawSignal) -> bool:
+    """Whether a channel that is called a speed and nothing else holds few values, and others than a flag's."""
+    values = np.unique(raw.values[np.isfinite(raw.values)])
+    plain = _PLAIN.search(channel.name.rpartition(".")[2])
+    return plain is not None and bool(np.any(values > 1.0)) and in_range(NAME, channel.unit or "km/h", raw)
 
 
 def _companion(recording: Recording, channel: SourceChannel) -> str | None:
@@ -90,15 +86,7 @@ def _companion(recording: Recording, channel: SourceChannel) -> str | None:
 
 def _entry(channel: SourceChannel, raw: RawSignal, valid: str | None) -> str:
     """The table of the names file, with what the channel shows."""
-    finite = raw.values[np.isfinite(raw.values)]
-    unit = channel.unit or "km/h"
-    doubt = "" if channel.unit else "  # the recording says none: which is it?"
-    shown = f"{finite.min():.4g} to {finite.max():.4g} {channel.unit}".rstrip()
-    lines = [
-        f"[{NAME}]",
-        f"source = {quoted(channel.name)}  # {np.unique(finite).size} different values, {shown}",
-        f"unit = {quoted(unit)}{doubt}",
-    ]
+    lines = table_of(NAME, channel, raw, channel.unit or "km/h", "which is it?")
     if valid is not None:
         lines.append(f"valid = {quoted(valid)}  # values count only while it is 1")
     return "\n".join(lines) + "\n"

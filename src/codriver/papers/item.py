@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite
 
@@ -26,9 +27,20 @@ class Item:
     holds: bool | None
     note: str
 
+    @property
+    def own(self) -> bool:
+        """Whether the paper says nothing of it: a goal or a finding of ours."""
+        return self.paper is None
+
     def to_dict(self) -> dict[str, object]:
         """As JSON holds it: numbers that are none become null."""
         return {k: None if isinstance(v, float) and not isfinite(v) else v for k, v in asdict(self).items()}
+
+
+def counts(items: Sequence[Item]) -> str:
+    """How many hold, do not, and cannot be judged, in words."""
+    held = [sum(item.holds is verdict for item in items) for verdict in (True, False, None)]
+    return f"{held[0]} hold, {held[1]} do not, {held[2]} cannot be judged here"
 
 
 def near(item: str, paper: float, ours: float, unit: str, tolerance: float, note: str = "") -> Item:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from codriver.papers.item import Item
+from codriver.papers.item import Item, counts
 from codriver.report.document import Document, Mark, Part, Section, Table, write_document
 from codriver.report.write import write_whole
 
@@ -65,16 +65,27 @@ class Reproduction:
         """All items, in order."""
         return tuple(item for chapter in self.chapters for item in chapter.items)
 
+    @property
+    def of_paper(self) -> tuple[Item, ...]:
+        """What the paper says."""
+        return tuple(item for item in self.items if not item.own)
+
+    @property
+    def beside(self) -> tuple[Item, ...]:
+        """What it does not: ours alone."""
+        return tuple(item for item in self.items if item.own)
+
     def document(self, command: str = "") -> Document:
         """The report."""
-        counts = [sum(item.holds is verdict for item in self.items) for verdict in (True, False, None)]
         facts = (
-            ("paper", self.citation), ("items", str(len(self.items))), ("hold", str(counts[0])),
-            ("do not hold", str(counts[1])), ("cannot be judged here", str(counts[2])), *self.facts,
+            ("paper", self.citation), ("items of the paper", f"{len(self.of_paper)}: {counts(self.of_paper)}"),
+            ("items beside it", f"{len(self.beside)}: {counts(self.beside)}"), *self.facts,
         )  # fmt: skip
-        failed = [item for item in self.items if item.holds is False]
+        failed, missed = ([i for i in items if i.holds is False] for items in (self.of_paper, self.beside))
         summary = Section("What does not hold", (
-            items_table(tuple(failed)) if failed else "Every item that could be judged holds.",
+            "Of the paper:" if failed else "Every item of the paper that could be judged holds.",
+            *((items_table(tuple(failed)),) if failed else ()),
+            *(("Beside it, of our own goals:", items_table(tuple(missed))) if missed else ()),
         ))  # fmt: skip
         return Document(self.title, self.lead, (summary, *(c.section() for c in self.chapters)), facts, command)
 
