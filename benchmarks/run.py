@@ -45,6 +45,7 @@ LIMITS = """## What limits the rest
 * The Kalman form has three times the arithmetic, and two divisions that wait for one another (each row's 1 / s).
 * All outputs instead of the four estimates: the noise scale with its divisions and roots, and a store a column; with fresh
   arrays the system's clearing of new pages comes on top. `compile(observer, outputs=[...])` leaves out what is not asked for.
+* The joint filters wait for divisions and roots: the EKF has 6 divisions in a row of 116 operations, the UKF 17 in 442.
 * From BLF to Parquet, half of the time is unpacking and finding the frames; a cold start is imports (scipy, numpy, typer,
   cantools with python-can).
 """
