@@ -72,6 +72,7 @@ class TestMade:
         off = modelled(drive, fit.model) - modelled(drive, TRUTH)
         assert np.std(off) < 0.05 * np.std(drive.torque)
 
+    @pytest.mark.slow
     def test_standard_errors_cover(self):
         """Over made drives, k_a and T_0 lie within two standard errors of the truth about as often as they say."""
         off = []
@@ -92,6 +93,7 @@ class TestMade:
         assert 1.0 < fit.held.time < 4.0
         assert fit.held.whole.rmse["map"] < fit.held.whole.rmse["regression"] < fit.held.whole.rmse["mean"]
 
+    @pytest.mark.slow
     def test_blocks_of_one_drive_see_nothing_of_themselves(self, made):
         """A part left out is the same whatever its torque is."""
         drive = alignment_drive(made[0], TRUTH)
@@ -123,6 +125,7 @@ class TestMade:
         assert loaded.number("alignment_torque_time") == fit.held.time
         assert loaded.parameters["alignment_gain"].sd == fit.coefficients["k_a"].sd
 
+    @pytest.mark.slow
     def test_geometry_scales_the_gain_alone(self, made):
         """Twice the ratio is half the curvature: k_a doubles, and the torque stays."""
         ratio = cd.Vehicle("car", "", "", {}).with_parameter("steering_ratio", 30.0)
@@ -148,6 +151,7 @@ class TestRefusals:
         assert fit.model.bank == 0.04
         assert "road_bank" not in fit.vehicle()
 
+    @pytest.mark.slow
     def test_gentle_curves_do_not_tell_the_bend(self):
         fit = identify_alignment([made_drive(6, curves=0.25)])
         assert "T_s" in {r.name for r in fit.refused}

@@ -217,6 +217,7 @@ class TestNoise:
         assert fit.rows == pytest.approx(use.sum(), abs=2)
         assert fit.log_likelihood[1, fit.noise.balance] == pytest.approx(wanted, rel=2e-3)
 
+    @pytest.mark.slow
     def test_several_records_and_pieces_of_a_long_one(self, plain, monkeypatch):
         """Records joined add their rows; a long one is looked at in pieces, and tells much the same."""
         car = vehicle_of(SMOOTH)
@@ -488,6 +489,7 @@ class TestAgainstTheLog:
         assert bad.rmse == pytest.approx(0.1 / 0.3515 * 10 / np.sqrt(3), rel=0.15)
 
 
+@pytest.mark.slow
 class TestAssist:
     """A car that keeps its lane by a motor whose torque the log holds: the map from drives without hands, then hands on and off."""
 

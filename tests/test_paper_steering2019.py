@@ -115,7 +115,9 @@ class TestTorque:
         records = driven_runs(reading, 20, plant="euler", held=True, true_start=True)
         assert low < rmse(torque_of(wheel_pi(), records), records.driver).mean() < high
 
-    @pytest.mark.parametrize("kind", LIMITS)
+    @pytest.mark.parametrize(
+        "kind", [pytest.param(kind, marks=() if kind == "derivative" else pytest.mark.slow) for kind in LIMITS]
+    )
     def test_filters_against_the_pi_observer(self, kind):
         """The best causal filter at most 0.6 and 0.85 of the PI observer at its best; smoother 0.1 and 0.2 of the paper's."""
         c = compare_filters(kind, 10, 3)
@@ -162,6 +164,7 @@ def test_identification_with_few_seeds():
     assert found(items, "figs. 2, 3: the 1σ bars").holds is False
 
 
+@pytest.mark.slow
 def test_robustness_with_few_seeds():
     items = robustness_chapter(20).items
     for start in ("4.1: a remedy", "algorithm 1", "remark 4: a dual EKF"):
@@ -188,6 +191,7 @@ class TestLab:
         assert found(items, "4.2: J_s and b_s describe").holds is False
         assert 0.85 < found(items, "(90): J_s").ours / 0.0298 < 1.15
 
+    @pytest.mark.slow
     def test_figure_10_measures_lag(self, lab):
         items = drive_chapter(lab).items
         verified = found(items, "fig. 10: the reproduced angle verifies")
