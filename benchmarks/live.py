@@ -16,6 +16,7 @@ LIMIT = 5e-6  # s, of one call
 TYPICAL = {
     "longitudinal_speed": 20.0, "longitudinal_acceleration": 0.1, "accelerator_pedal": 0.2, "brake_pressure": 0.0,
     "brake_switch": 0.0, "engine_torque": 80.0, "engine_torque_request": 85.0, "gear": 3.0, "clutch": 0.0,
+    "steering_wheel_angle": 0.1, "alignment_torque": -0.2,
 }  # fmt: skip
 
 
@@ -23,10 +24,12 @@ def run(quick: bool = False) -> Iterator[Row]:
     """All rows."""
     calls = CALLS // 10 if quick else CALLS
     other = _filterpy(calls)
-    vehicle = cd.load_vehicle("bisoffi2017")
-    for name in ESTIMATORS:
+    car, wheel = cd.load_vehicle("bisoffi2017"), cd.load_vehicle("okamoto2019")
+    # The others of the driver's torque differ from the first in where the known torque is from.
+    steered = ("driver-torque-logged", "driver-torque-pi")
+    for name in (*(n for n, e in ESTIMATORS.items() if e.family == "intent"), *steered):
         say(f"  {name}")
-        observer = cd.build(name, vehicle)
+        observer = cd.build(name, wheel if name in steered else car)
         stepper = cd.compile(observer).live()
         values = {channel: TYPICAL[channel] for channel in observer.channels}
         row = [*values.values(), *[1] * len(observer.flags)]
