@@ -182,6 +182,15 @@ class TestRefusals:
         with pytest.raises(DesignError, match=r"rank\(C D\) = 0, rank\(D\) = 1"):
             design_unknown_input_observer(wheel(), ("driver_torque",), [1, 1], [1], 0.05)
 
+    def test_numbers_that_cannot_be(self):
+        for Q, R in (([1, 1], [0, 0]), ([1, -1], [1, 1]), ([1], [1, 1]), ([1, np.nan], [1, 1])):
+            with pytest.raises(DesignError, match="correct them"):
+                design_unknown_input_observer(wheel(True), ("driver_torque",), Q, R, 0.05)
+        plant = wheel()
+        broken = StateSpace(plant.A * np.nan, plant.B, plant.C, plant.D, plant.states, plant.inputs, plant.outputs)
+        with pytest.raises(DesignError, match="not finite"):
+            design_pi_observer(broken, ("driver_torque",), np.eye(3), 1.0)
+
 
 class TestUnknownInputObserver:
     def test_tells_the_input_behind_its_low_pass(self):

@@ -100,6 +100,12 @@ def design_unknown_input_observer(
             "a detectable pair (P A, C)", "measure more",
         )  # fmt: skip
     weight = [np.diag(np.asarray(w, float)) if np.ndim(w) == 1 else np.asarray(w, float) for w in (Q, R)]
+    sizes = [w.shape == (k, k) and bool(np.isfinite(w).all()) for w, k in zip(weight, (n, p), strict=True)]
+    if not all(sizes) or np.linalg.eigvalsh(weight[0])[0] < 0 or np.linalg.eigvalsh(weight[1])[0] <= 0:
+        raise DesignError(
+            f"weights of shapes {weight[0].shape} and {weight[1].shape} that are not positive",
+            f"Q >= 0 of shape ({n}, {n}), R > 0 of shape ({p}, {p}), or their diagonals", "correct them",
+        )  # fmt: skip
     K = solve_continuous_are(PA.T, C.T, *weight) @ C.T @ np.linalg.inv(weight[1])
     N, G = PA - K @ C, (np.eye(n) + E @ C) @ B
     L = K @ (np.eye(p) + C @ E) - PA @ E

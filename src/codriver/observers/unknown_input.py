@@ -37,7 +37,7 @@ def with_unknown(model: StateSpace, unknown: Sequence[str], order: int = 1) -> S
         a model of the known inputs alone; its last states are the unknown inputs, and then their rates.
 
     Raises:
-        DesignError: an input is not the model's, there is none, or no such order.
+        DesignError: an input is not the model's, there is none, no such order, or numbers that are not finite.
     """
     strange = [name for name in unknown if name not in model.inputs]
     if strange or not unknown or order not in ORDERS:
@@ -45,6 +45,8 @@ def with_unknown(model: StateSpace, unknown: Sequence[str], order: int = 1) -> S
             f"unknown inputs {list(unknown)} of order {order}", f"some of {', '.join(model.inputs)}, of order 1 or 2",
             "name inputs of the model",
         )  # fmt: skip
+    if not all(np.isfinite(matrix).all() for matrix in (model.A, model.B, model.C, model.D)):
+        raise DesignError("a plant with numbers that are not finite", "finite A, B, C, D", "correct the plant")
     n, k = len(model.states), len(unknown)
     known = [i for i, name in enumerate(model.inputs) if name not in unknown]
     hidden = [model.inputs.index(name) for name in unknown]
