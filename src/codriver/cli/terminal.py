@@ -79,8 +79,6 @@ def say(summary: dict[str, Any]) -> None:
         numbers = [f"{row[key]:.3f}" if row[key] is not None else "-" for key in ("rms", "p5", "p95", "mean_sd")]
         table.add_row(name, str(row["unit"]), *numbers)
     out.print(table)
-    if summary["sensor"] is not None:
-        out.print(f"\n{escape(summary['sensor']['text'])}")
     out.print(f"\n[bold]verdict[/]: {summary['verdict']}")
     say_findings(out, summary["findings"])
     out.print(
