@@ -84,6 +84,7 @@ class TestMade:
             ]
         assert 0.5 < np.sqrt(np.mean(np.square(off))) < 2.0
 
+    @pytest.mark.slow
     def test_error_and_its_time_come_from_what_was_held_out(self, made):
         fit = identify_alignment(made)
         assert fit.held.by_drive
@@ -144,6 +145,7 @@ class TestMade:
 
 
 class TestRefusals:
+    @pytest.mark.slow
     def test_one_speed_does_not_tell_the_bank(self):
         fit = identify_alignment([made_drive(5, steady=20.0)])
         assert "e_max" in {r.name for r in fit.refused}
@@ -268,6 +270,7 @@ class TestLincoln:
         level = fit_map(rows, replace(TRUTH, bank=0.0), [name for name in LETTERS if name not in ("e_max", "q")])
         assert banked.sd < 0.75 * level.sd
 
+    @pytest.mark.slow
     def test_command_line(self, mkz, tmp_path):
         from codriver.cli.app import app
 

@@ -88,6 +88,7 @@ class TestFilter:
         assert rms(e) < 0.5 * rms(errors(without, rubbing)[0])
         assert 0.9 < np.mean(np.abs(e) < 1.96 * sd) < 0.99
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("drive_name", "best", "paper"), [("plain", 1.03, 0.9), ("rubbing", 0.5, 0.5)])
     def test_against_the_pi_observer_and_the_quasistatic_answer(self, drive_name, best, paper, request):
         """The paper's V_33 and others in decades, and T_dr = -T_aln.
@@ -109,6 +110,7 @@ class TestFilter:
         assert ours < best * min(others.values())
         assert ours < 0.7 * rms((-drive.alignment_torque - drive.driver_torque)[settled])
 
+    @pytest.mark.slow
     def test_hindsight_is_better(self, plain):
         log, car = plain.log(), vehicle_of(SMOOTH)
         filtered = rms(errors(estimate_log(NAME, log, car), plain)[0])
@@ -320,6 +322,7 @@ class TestBadAngles:
         assert rms(e) < 0.2
         assert np.mean(np.abs(e) < 1.96 * sd) > 0.9
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", [NAME, "driver-torque-pi"])
     def test_an_encoders_faults_do_not_reach_either_estimator(self, plain, name):
         """Wraps, jumps, wrong samples and gaps: hardly worse where valid than without them, and told."""
@@ -403,6 +406,7 @@ class TestVerdict:
         wrong = replace(log["alignment_torque"], values=factor * log["alignment_torque"].values + 0.0)
         assert self.severity(self.told(log.with_signals(wrong)), words) == severity
 
+    @pytest.mark.slow
     def test_known_torque_that_scatters_or_comes_rarely(self, plain):
         log, rng = plain.log(), np.random.default_rng(1)
         noisy = replace(
@@ -416,6 +420,7 @@ class TestVerdict:
         still = with_angle(plain, np.full(plain.time.size, 0.2))
         assert self.severity(self.told(still), "moves by 0 deg in all") == "bad"
 
+    @pytest.mark.slow
     def test_an_assist_motor_taken_for_force_feedback(self):
         """A car's motor helps the driver; without the tyres the answer would be wrong, and looks fine to the innovations."""
         setting = HandsSetting(seconds=120.0)

@@ -182,6 +182,7 @@ class TestCalibration:
         for b in judged.bins:
             assert b.share < 0.01 or abs(b.said - b.found) < 0.04
 
+    @pytest.mark.slow
     def test_correlated_samples_need_the_tempering(self):
         right, naive = self.judged(self.QUICK, 0.3, 0.3), self.judged(self.QUICK, INDEPENDENT, 0.3)
         assert right.calibration_error < 0.08 < naive.calibration_error

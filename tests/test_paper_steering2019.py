@@ -115,9 +115,8 @@ class TestTorque:
         records = driven_runs(reading, 20, plant="euler", held=True, true_start=True)
         assert low < rmse(torque_of(wheel_pi(), records), records.driver).mean() < high
 
-    @pytest.mark.parametrize(
-        "kind", [pytest.param(kind, marks=() if kind == "derivative" else pytest.mark.slow) for kind in LIMITS]
-    )
+    @pytest.mark.slow
+    @pytest.mark.parametrize("kind", LIMITS)
     def test_filters_against_the_pi_observer(self, kind):
         """The best causal filter at most 0.6 and 0.85 of the PI observer at its best; smoother 0.1 and 0.2 of the paper's."""
         c = compare_filters(kind, 10, 3)
@@ -216,6 +215,7 @@ class TestLab:
 
 
 class TestRecorded:
+    @pytest.mark.slow
     @pytest.mark.parametrize(("folder", "title", "holds"), [
         ("iracing", "Shaft torque", [False, True]),
         ("udacity-lincoln-mkz", "A real car", [True, True]),
