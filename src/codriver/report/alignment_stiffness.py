@@ -18,7 +18,7 @@ def stiffness_rows(fit: StiffnessFit, old: Vehicle | None) -> list[tuple[str, ..
     name = "alignment_stiffness"
     before = f"{old.number(name):.4g}" if old is not None and name in old else "-"
     return [
-        ("K_aln", "N m/rad", f"{fit.stiffness:.4g}", f"{fit.sd:.2g}", f"{fit.low:.4g} to {fit.high:.4g}", before),
+        ("K_aln", "N m/rad", f"{fit.stiffness:.5g}", f"{fit.sd:.2g}", f"{fit.low:.5g} to {fit.high:.5g}", before),
         ("T_0", "N m", f"{fit.offset:.3g}", "", "", "-"),
     ]
 
