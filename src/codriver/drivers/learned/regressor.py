@@ -9,7 +9,7 @@ A `TorqueRegressor` is a scikit-learn regressor: `fit(X, y)`, `predict(X)`, para
 Rows of a record are in the order of time. Models with a memory take `lengths`, the lengths of the stretches without holes that X is
 made of, one after the other; to others the rows are independent.
 
-Okamoto, Tsiotras 2019, doi:10.1016/j.robot.2019.01.006, section 2.
+Okamoto, Tsiotras 2019 (Robotics and Autonomous Systems), section 2.
 """
 
 from __future__ import annotations
