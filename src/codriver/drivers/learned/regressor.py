@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -69,9 +70,7 @@ class TorqueRegressor(RegressorMixin, BaseEstimator, ABC):
         """The carried scalars of `step` and what they start from."""
         return {}
 
-    def step(
-        self, carry: Mapping[str, Scalar], z: Sequence[Scalar]
-    ) -> tuple[dict[str, Scalar], Scalar, Scalar]:
+    def step(self, carry: Mapping[str, Scalar], z: Sequence[Scalar]) -> tuple[dict[str, Scalar], Scalar, Scalar]:
         """One prediction on scalars, for the kernel.
 
         Args:
@@ -100,4 +99,4 @@ def stretches(n: int, lengths: Sequence[int] | None) -> list[slice]:
     if sum(sizes) != n or min(sizes, default=0) < 0:
         raise ValueError(f"lengths sum to {sum(sizes)}; X has {n} rows")
     edges = np.cumsum([0, *sizes])
-    return [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]
+    return [slice(int(a), int(b)) for a, b in pairwise(edges) if b > a]

@@ -1,0 +1,209 @@
+"""A learned driver: from drives to a value that foretells the torque, with a band.
+
+    fit_driver(drives) -> LearnedDriver          driver.predict(log) -> TorquePrediction
+
+What it was learnt from, and how it did on blocks it had not seen, goes with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from codriver.drivers.learned.calibration import Calibration
+from codriver.drivers.learned.features import Feature, FeatureTable, features_of
+from codriver.drivers.learned.kinds import DEFAULT, regressor_of
+from codriver.drivers.learned.protocol import Fold, Protocol, time_blocks
+from codriver.drivers.learned.regressor import TorqueRegressor
+from codriver.drivers.learned.scaling import Scaling
+from codriver.errors import LogError
+from codriver.signals import Log
+from codriver.signals.signal import Array
+
+CALIBRATION_FOLDS = 3
+LEAST_ROWS = 150  # at dt .2 s half a minute
+
+
+@dataclass(frozen=True, eq=False)
+class TorquePrediction:
+    """What a driver foretells on one drive.
+
+    Attributes:
+        time: of each row's now, s, shape (n,).
+        horizon: the torque is that of time + horizon, s.
+        mean, sd: N m, shape (n,).
+        low, high: 95 % band, N m, shape (n,).
+        measured: torque at time + horizon, N m, shape (n,); NaN where not known.
+        last: torque now, N m, shape (n,).
+        log_density: of the measured torque, shape (n,).
+    """
+
+    time: Array
+    horizon: float
+    mean: Array
+    sd: Array
+    low: Array
+    high: Array
+    measured: Array
+    last: Array
+    log_density: Array
+
+    @property
+    def error(self) -> Array:
+        """Measured less foretold, N m."""
+        return self.measured - self.mean
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedDriver:
+    """A driver that has been learnt.
+
+    Attributes:
+        name: whose it is.
+        kind: of model.
+        protocol: features and scaling.
+        signals: used beside the torque.
+        target: the torque's name.
+        features: the columns of z.
+        scaling: of features and torque.
+        regressor: what was learnt.
+        calibration: of its bands.
+        training: what it was learnt from: drives, rows, seconds, spread of the torque; RMSE and coverage on held-out blocks.
+        left_out: signals that the drives lack.
+    """
+
+    name: str
+    kind: str
+    protocol: Protocol
+    signals: tuple[str, ...]
+    target: str
+    features: tuple[Feature, ...]
+    scaling: Scaling
+    regressor: TorqueRegressor
+    calibration: Calibration = Calibration()
+    training: Mapping[str, Any] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+
+    def table(self, log: Log | Sequence[Log], with_target: bool = True) -> FeatureTable:
+        """Features of drives as this driver wants them.
+
+        Raises:
+            MissingSignal: a drive lacks one of its signals.
+            LogError: there is no usable row.
+        """
+        return features_of(
+            log, self.protocol.features, signals=self.signals, target=self.target, with_target=with_target
+        )
+
+    def predict(self, log: Log, *, with_target: bool = True) -> TorquePrediction:
+        """Foretell the torque of a drive, row by row.
+
+        Args:
+            log: the drive.
+            with_target: only rows whose torque to come is known; False goes on to the end of the drive.
+
+        Raises:
+            MissingSignal: the drive lacks one of the driver's signals.
+            LogError: there is no usable row.
+        """
+        return self.predict_table(self.table(log, with_target))
+
+    def predict_table(self, table: FeatureTable) -> TorquePrediction:
+        """Foretell the rows of a table, given in the order of time."""
+        mean, own_sd = predicted(self.regressor, self.scaling, table)
+        half = self.calibration.half_width(own_sd)
+        made = TorquePrediction(
+            table.time, self.protocol.features.horizon, mean, self.calibration.sd(own_sd), mean - half, mean + half,
+            table.y, table.X[:, table.torque_columns[0]], self.calibration.log_density(table.y - mean, own_sd),
+        )  # fmt: skip
+        order = np.lexsort((table.time, table.drive))
+        return replace(made, **{n: v[order] for n, v in vars(made).items() if isinstance(v, np.ndarray)})
+
+
+def fit_driver(
+    drives: Log | Sequence[Log], kind: str = DEFAULT, *, name: str = "driver", protocol: Protocol | None = None,
+    options: Mapping[str, Any] | None = None,
+) -> LearnedDriver:  # fmt: skip
+    """Learn a driver from drives.
+
+    Args:
+        drives: of this driver.
+        kind: of model.
+        name: whose.
+        protocol: features and scaling; default: the honest one.
+        options: parameters of the model.
+
+    Raises:
+        MissingSignal: a drive lacks the torque.
+        LogError: there are too few usable rows.
+        UsageError: there is no such kind or parameter.
+    """
+    protocol = protocol or Protocol()
+    logs = [drives] if isinstance(drives, Log) else list(drives)
+    return fit_table(features_of(logs, protocol.features), kind, name=name, protocol=protocol, options=options)
+
+
+def fit_table(
+    table: FeatureTable, kind: str = DEFAULT, *, name: str = "driver", protocol: Protocol | None = None,
+    options: Mapping[str, Any] | None = None, scaling: Scaling | None = None, calibrate: bool = True,
+) -> LearnedDriver:  # fmt: skip
+    """Learn a driver from rows.
+
+    Args:
+        table, kind, name, protocol, options: as for `fit_driver`.
+        scaling: default: from the rows.
+        calibrate: learn the bands from blocks left out in turn, for which the model is fitted as many times again.
+
+    Raises:
+        LogError: there are too few rows.
+    """
+    protocol = protocol or Protocol()
+    if len(table) < LEAST_ROWS or not table.y.std() > 0:
+        why = f"{len(table)} usable rows" if len(table) < LEAST_ROWS else "a torque that never changes"
+        raise LogError(
+            f"{why} to learn a driver from", f"{LEAST_ROWS} rows or more, of a torque that changes", "add drives"
+        )
+    scaling = scaling or Scaling.of(table)
+    regressor = fitted(regressor_of(kind, table, protocol.features, options), scaling, table)
+    folds = time_blocks(table, CALIBRATION_FOLDS, protocol.gap or protocol.features.horizon, protocol.features)
+    z, errors = [], []
+    for fold in folds if calibrate else []:
+        mean, sd = held_out(table, fold, kind, protocol, options)
+        z.append((table.y[fold.test] - mean) / sd)
+        errors.append(table.y[fold.test] - mean)
+    calibration = Calibration.of(np.concatenate(z)) if z else Calibration()
+    tick = protocol.features.tick if protocol.features.dense else protocol.features.dt
+    training = {
+        "drives": int(np.unique(table.drive).size), "rows": len(table), "minutes": len(table) * tick / 60,
+        "torque_rms": float(np.sqrt(np.mean(table.y**2))),
+    } | ({"held_out_rmse": float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))} if errors else {})  # fmt: skip
+    signals = tuple(dict.fromkeys(f.signal for f in table.features if f.signal != table.target))
+    return LearnedDriver(
+        name, kind, protocol, signals, table.target, table.features, scaling, regressor, calibration, training,
+        table.left_out,
+    )  # fmt: skip
+
+
+def held_out(
+    table: FeatureTable, fold: Fold, kind: str, protocol: Protocol, options: Mapping[str, Any] | None = None
+) -> tuple[Array, Array]:
+    """Mean and own sd for the judged rows of a fold, N m, by a model of its training rows alone."""
+    train, test = table.take(fold.train), table.take(fold.test)
+    scaling = Scaling.of(table if protocol.scaling == "record" else train)
+    model = fitted(regressor_of(kind, table, protocol.features, options), scaling, train)
+    return predicted(model, scaling, test)
+
+
+def fitted(regressor: TorqueRegressor, scaling: Scaling, table: FeatureTable) -> TorqueRegressor:
+    """A regressor that has learnt a table; one without memory gets the rows in the order of time."""
+    table = table if regressor.has_memory else table.in_time()
+    return regressor.fit(scaling.features(table.X), scaling.torque(table.y), table.lengths)
+
+
+def predicted(regressor: TorqueRegressor, scaling: Scaling, table: FeatureTable) -> tuple[Array, Array]:
+    """Mean and own sd for the rows of a table, N m."""
+    mean, sd = regressor.predict(scaling.features(table.X), return_std=True, lengths=table.lengths)
+    return scaling.in_newton_metres(mean, sd)
