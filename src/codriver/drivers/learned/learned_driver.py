@@ -83,7 +83,7 @@ class LearnedDriver:
     features: tuple[Feature, ...]
     scaling: Scaling
     regressor: TorqueRegressor
-    calibration: Calibration = Calibration()
+    calibration: Calibration = field(default_factory=Calibration)
     training: Mapping[str, Any] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
 
@@ -120,7 +120,8 @@ class LearnedDriver:
             table.y, table.X[:, table.torque_columns[0]], self.calibration.log_density(table.y - mean, own_sd),
         )  # fmt: skip
         order = np.lexsort((table.time, table.drive))
-        return replace(made, **{n: v[order] for n, v in vars(made).items() if isinstance(v, np.ndarray)})
+        ordered: dict[str, Any] = {n: v[order] for n, v in vars(made).items() if isinstance(v, np.ndarray)}
+        return replace(made, **ordered)
 
 
 def fit_driver(

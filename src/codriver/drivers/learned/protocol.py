@@ -1,7 +1,7 @@
 """How a learned driver is judged: what is held out, what scaling may see, and which leaks a protocol has.
 
-honest      features of the past and the road ahead; scaling from the training part; whole drives held out, or blocks of one drive with
-            a gap on either side
+honest      features of the past and the road ahead; scaling from the training part; whole drives held out, or blocks of one
+            drive with a gap on either side
 paper2019   features that hold the vehicle's states at the very moment, smoothed with hindsight; scaling from the whole record; four
             quarters without a gap
 
