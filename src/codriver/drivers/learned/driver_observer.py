@@ -4,8 +4,9 @@
                        z from the lines      T(t + h) foretold      sd
 
 The road ahead comes in as inputs `road_curvature_ahead_1`, ..., the curvature at the places reached in dt, 2 dt, ... at the
-present speed, since a bus cannot know it from the past. `valid` is 1 once the lines are full of fresh values, and the vehicle moves.
-A model with memory has one state for each of the `substeps` interleaved rows dt apart, as in training; after a hole it starts anew.
+present speed, since a bus cannot know it from the past. `valid` is 1 once the lines are full of fresh values, and the vehicle
+moves. A model with memory has one state for each of the `substeps` interleaved rows dt apart, as in training; after a hole it
+starts anew.
 """
 
 from __future__ import annotations

@@ -65,6 +65,7 @@ class Evaluation:
         features: names of the columns.
         left_out: signals that the drives lack.
         target: the torque's name.
+        estimated: whether that is an estimate from the wheel's angle.
     """
 
     protocol: Protocol
@@ -73,6 +74,7 @@ class Evaluation:
     features: tuple[str, ...]
     left_out: tuple[str, ...]
     target: str
+    estimated: bool = False
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -97,6 +99,12 @@ class Evaluation:
     def verdict(self, kind: str = DEFAULT) -> list[Finding]:
         """What can be said of a kind against the baselines, and of the protocol."""
         found = [Finding("bad", f"leak: {text}") for text in self.protocol.leaks]
+        if self.estimated:
+            worse = self.protocol.features.current != ()
+            said = "the torque is itself an estimate from the wheel's angle" + (
+                ", which the features hold" if worse else ""
+            )
+            found.append(Finding("bad" if worse else "warn", f"{'leak: ' if worse else ''}{said}"))
         if kind in self.scores:
             found += [self._against(kind, other) for other in BASELINES if other != kind and other in self.scores]
             inside = self.mean(kind, "inside95")
@@ -182,7 +190,13 @@ def evaluate_table(
                 gain = np.concatenate(blocks[other]) - np.concatenate(blocks[kind])
                 gains[kind, other] = float(gain.mean()), float(gain.std(ddof=1) / np.sqrt(gain.size))
     return Evaluation(
-        protocol, {kind: tuple(mine) for kind, mine in scores.items()}, gains, table.names, table.left_out, table.target
+        protocol,
+        {kind: tuple(mine) for kind, mine in scores.items()},
+        gains,
+        table.names,
+        table.left_out,
+        table.target,
+        table.estimated,
     )
 
 
