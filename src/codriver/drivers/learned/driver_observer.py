@@ -85,14 +85,14 @@ def observer_of(driver: LearnedDriver) -> Observer:
         size = driver.scaling.torque_size * sd
         factor = float(driver.calibration.sd(1.0))  # type: ignore[arg-type]
         return new, {
-            "torque_ahead": select(valid, torque, 0.0),
-            "torque_ahead_sd": select(valid, factor * size, 0.0),
+            "driver_torque_ahead": select(valid, torque, 0.0),
+            "driver_torque_ahead_sd": select(valid, factor * size, 0.0),
             "valid": select(valid, 1.0, 0.0),
         }
 
     outputs = (
-        Output("torque_ahead", "N*m", "estimate", f"the driver's torque {setting.horizon:g} s ahead"),
-        Output("torque_ahead_sd", "N*m", "sd", "its standard deviation"),
+        Output("driver_torque_ahead", "N*m", "estimate", f"the driver's torque {setting.horizon:g} s ahead"),
+        Output("driver_torque_ahead_sd", "N*m", "sd", "its standard deviation"),
         Output("valid", "1", "flag", "all signals have been there long enough, and the vehicle moves"),
     )
     settings: dict[str, str | float] = {"driver": driver.name, "model": driver.kind, "horizon": setting.horizon}

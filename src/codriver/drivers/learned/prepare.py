@@ -77,5 +77,5 @@ def _with_torque(log: Log, vehicle: Vehicle | None) -> tuple[Log, str]:
         ) from error  # fmt: skip
     torque = estimate["driver_torque"]
     values = np.where(estimate.valid, torque.values, np.nan)
-    signal = Signal("driver_torque", torque.time, values, torque.unit, f"{ESTIMATED}{estimate.estimator}")
-    return log.with_signals(signal), f"driver_torque is estimated by {estimate.estimator}; no sensor measured it"
+    signal = Signal("driver_torque", torque.time, values, torque.unit, f"{ESTIMATED}{estimate.observer}")
+    return log.with_signals(signal), f"driver_torque is estimated by {estimate.observer}; no sensor measured it"
