@@ -15,7 +15,8 @@ from codriver.signals.signal import Array
 
 FULL = {
     "pwc": "the torque stays (3)", "pwl": "its slope stays (4)", "ridge": "ridge", "ann": "neural net (26)",
-    "gp": "Gaussian process (16)", "gmr": "GMR (23)", "hmm-gmr": "HMM-GMR (25)", "boosting": "boosted ridge", "blend": "blend (default)",
+    "gp": "Gaussian process (16)", "gmr": "GMR (23)", "hmm-gmr": "HMM-GMR (25)", "boosting": "boosted ridge",
+    "blend": "blend (default)",
 }  # fmt: skip
 SHOWN = 120.0  # s of a drive, at most, so that single movements can be seen
 
@@ -41,8 +42,8 @@ def evaluation_document(
     left = ", ".join(first.left_out) or "none"
     return Document(
         "Models of a driver, judged on what they have not seen",
-        f"Each model foretells {first.target} {first.protocol.features.horizon:g} s ahead. Every part of the data is held out once and "
-        "foretold by models that learnt from the rest.",
+        f"Each model foretells {first.target} {first.protocol.features.horizon:g} s ahead. Every part of the data is held out once "
+        "and foretold by models that learnt from the rest.",
         tuple(sections),
         (
             ("drives", ", ".join(drives)), ("features", str(len(first.features))), ("signals the drives lack", left),
@@ -64,8 +65,8 @@ def leak_table(found: Sequence[Evaluation]) -> Table:
     ]
     return Table(
         ("model", *(e.protocol.name for e in found)), tuple(rows),
-        "RMSE over that of 'the torque stays', under each protocol. Where a protocol leaks, its column is a figure of the protocol and "
-        "not of the model. " + " ".join(f"{e.protocol.name}: {leak}." for e in found for leak in e.protocol.leaks),
+        "RMSE over that of 'the torque stays', under each protocol. Where a protocol leaks, its column is a figure of the protocol "
+        "and not of the model. " + " ".join(f"{e.protocol.name}: {leak}." for e in found for leak in e.protocol.leaks),
     )  # fmt: skip
 
 
@@ -87,7 +88,8 @@ def driver_document(driver: LearnedDriver, drives: Mapping[str, Log], command: s
         tuple(sections),
         (
             ("learnt from", f"{', '.join(drives)}; {training['minutes']:.1f} min"), ("rows", f"{training['rows']}"),
-            ("held-out RMSE", f"{rmse:.3f} N m"), ("the torque stays", f"{training.get('held_out_stays_rmse', float('nan')):.3f} N m"),
+            ("held-out RMSE", f"{rmse:.3f} N m"),
+            ("the torque stays", f"{training.get('held_out_stays_rmse', float('nan')):.3f} N m"),
             ("in the 95 % band", f"{training.get('held_out_inside95', float('nan')):.1%}"),
             ("signals the drives lack", ", ".join(driver.left_out) or "none"),
         ),
@@ -133,9 +135,12 @@ def _table(e: Evaluation) -> Table:
             max(s.seconds for s in e.scores[kind]),
         ))  # fmt: skip
     return Table(
-        ("model", "RMSE, N m", "s.e.", "of 'stays'", "NRMSE", "in 68 % band", "in 95 % band", "log density", "against ridge", "fit, s"),
+        (
+            "model", "RMSE, N m", "s.e.", "of 'stays'", "NRMSE", "in 68 % band", "in 95 % band", "log density", "against ridge",
+            "fit, s",
+        ),
         tuple(rows),
-        "Against ridge: by the gain in squared error over blocks of 10 s, two standard errors. NRMSE: over the scatter of the torque.",
+        "Against ridge: by the gain in squared error over blocks of 10 s, two standard errors. NRMSE: over the torque's scatter.",
     )  # fmt: skip
 
 
@@ -163,12 +168,13 @@ def _errors(driver: LearnedDriver) -> Chart:
     edges = np.linspace(-6, 6, 61)
     factor = np.sqrt(driver.calibration.nu / (driver.calibration.nu - 2))
     z = held.error / held.sd * factor
+    assumed = f"what the band assumes (Student, nu = {driver.calibration.nu:.1f})"
     density, _ = np.histogram(np.clip(z, -6, 6), edges, density=True)
     middle = (edges[1:] + edges[:-1]) / 2
     return Chart(
         "Errors in units of the band", "error / scale", (Plot("density", (
             Curve("held-out errors", middle, density, GREY, "bars"),
-            Curve(f"what the band assumes (Student, nu = {driver.calibration.nu:.1f})", middle, t.pdf(middle, driver.calibration.nu), "#C84C00"),
+            Curve(assumed, middle, t.pdf(middle, driver.calibration.nu), "#C84C00"),
         ), 220),),
         "The grey bars should follow the line; then the band holds what it promises.", half=True,
     )  # fmt: skip
