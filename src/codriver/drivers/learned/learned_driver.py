@@ -178,7 +178,7 @@ def fit_table(
         )
     scaling = scaling or Scaling.of(table)
     regressor = fitted(regressor_of(kind, table, protocol.features, options), scaling, table)
-    folds = time_blocks(table, CALIBRATION_FOLDS, protocol.gap or protocol.features.horizon, protocol.features)
+    folds = _calibration_folds(table, protocol)
     rows, means, sds = [], [], []
     for fold in folds if calibrate else []:
         mean, sd = held_out(table, fold, kind, protocol, options)
@@ -206,6 +206,15 @@ def fit_table(
         name, kind, protocol, signals, table.target, table.features, scaling, regressor, calibration, training,
         table.left_out, held,
     )  # fmt: skip
+
+
+def _calibration_folds(table: FeatureTable, protocol: Protocol) -> list[Fold]:
+    """Drives where there are three or more, since a new drive is what a band has to hold for; else blocks."""
+    drives = np.unique(table.drive)
+    if drives.size < CALIBRATION_FOLDS or protocol.hold_out == "blocks":
+        return time_blocks(table, CALIBRATION_FOLDS, protocol.gap or protocol.features.horizon, protocol.features)
+    group = np.searchsorted(drives, table.drive) % CALIBRATION_FOLDS
+    return [Fold(str(k), np.flatnonzero(group != k), np.flatnonzero(group == k)) for k in range(CALIBRATION_FOLDS)]
 
 
 def held_out(
