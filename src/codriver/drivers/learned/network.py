@@ -93,7 +93,7 @@ class NetworkRegressor(TorqueRegressor):
         self,
         hidden: int = 2,
         restarts: int = 5,
-        alpha: float = 0.1,
+        alpha: float = 0.01,
         max_steps: int = 200,
         patience: int = 10,
         gap: int = 10,
