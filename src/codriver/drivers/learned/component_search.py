@@ -1,18 +1,20 @@
 """How many components: the number with the least AIC or BIC, tried from the smallest on.
 
-The search ends once the criterion has risen `RISES` times in a row above its least: it falls and then rises, and larger
-models are the dear ones.
+A larger number has to gain more than `WORTH`: less is no evidence (Kass, Raftery 1995, doi 10.1080/01621459.1995.10476572), and
+where components died, two numbers give one model. The search ends once `RISES` numbers in a row were not worth it: the criterion
+falls and then rises, and larger models are the dear ones.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import inf
 from typing import TypeVar
 
 from codriver.drivers.learned.mixture import criterion
 
 M = TypeVar("M")
-RISES = 2
+RISES, WORTH = 2, 2.0
 
 
 def candidate_numbers(components: int | str, candidates: Sequence[int], n: int) -> tuple[list[int], str]:
@@ -41,10 +43,10 @@ def candidate_numbers(components: int | str, candidates: Sequence[int], n: int) 
 def least(
     numbers: Sequence[int], name: str, n: int, fit: Callable[[int], tuple[M, float, int]]
 ) -> tuple[M, dict[int, float]]:
-    """The model with the least criterion.
+    """The model with the least criterion, to within `WORTH`.
 
     Args:
-        numbers: of components, ascending.
+        numbers: of components, ascending, at least one.
         name: "aic" or "bic".
         n: rows.
         fit: from a number of components to a model, its log-likelihood and its number of parameters.
@@ -53,17 +55,15 @@ def least(
         the model; the criterion by number of components, as far as was tried.
     """
     tried: dict[int, float] = {}
-    best: M | None = None
-    rises = 0
+    found: list[M] = []
+    lowest, rises = inf, 0
     for number in numbers:
         model, log_likelihood, parameters = fit(number)
-        value = criterion(name, log_likelihood, parameters, n)
-        if best is None or value < min(tried.values()):
-            best, rises = model, 0
+        tried[number] = criterion(name, log_likelihood, parameters, n)
+        if not found or tried[number] < lowest - WORTH:
+            found, lowest, rises = [model], tried[number], 0
         else:
             rises += 1
-        tried[number] = value
         if rises == RISES:
             break
-    assert best is not None
-    return best, tried
+    return found[0], tried
