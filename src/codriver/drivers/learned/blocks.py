@@ -76,9 +76,7 @@ def gap_that_fits(n: int, gap: int) -> int:
     return min(gap, n // 50)
 
 
-def _apart(
-    n: int, blocks: Iterable[tuple[int, int]], gap: int, lengths: Sequence[int] | None
-) -> tuple[Rows, Rows]:
+def _apart(n: int, blocks: Iterable[tuple[int, int]], gap: int, lengths: Sequence[int] | None) -> tuple[Rows, Rows]:
     """Rows outside and inside of blocks [a, b), without those within the gap."""
     tested, taken = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     for a, b in blocks:

@@ -34,7 +34,9 @@ class _Passing(TorqueRegressor):
 
     def _sum(self, column: Any) -> Any:
         """The weighted sum of what `column(place)` gives."""
-        terms = [weight * column(place) if weight != 1.0 else column(place) for place, weight in self._weights().items()]
+        terms = [
+            weight * column(place) if weight != 1.0 else column(place) for place, weight in self._weights().items()
+        ]
         return sum(terms[1:], start=terms[0])
 
     def _refuse_columns(self, d: int) -> None:
@@ -72,9 +74,7 @@ class _Passing(TorqueRegressor):
         self._refuse_columns(self.n_features_in_)
         return self
 
-    def step(
-        self, carry: Mapping[str, Scalar], z: Sequence[Scalar]
-    ) -> tuple[dict[str, Scalar], Scalar, Scalar]:
+    def step(self, carry: Mapping[str, Scalar], z: Sequence[Scalar]) -> tuple[dict[str, Scalar], Scalar, Scalar]:
         """One prediction on scalars."""
         return {}, self._sum(lambda place: z[place]), self.sd_
 

@@ -183,9 +183,7 @@ class NetworkRegressor(TorqueRegressor):
         self._take(array(state, "weights"), array(state, "factor"), int(state["features"]))
         return self
 
-    def step(
-        self, carry: Mapping[str, Scalar], z: Sequence[Scalar]
-    ) -> tuple[dict[str, Scalar], Scalar, Scalar]:
+    def step(self, carry: Mapping[str, Scalar], z: Sequence[Scalar]) -> tuple[dict[str, Scalar], Scalar, Scalar]:
         """One prediction on scalars."""
         import casadi as ca
 

@@ -106,9 +106,7 @@ class RidgeRegressor(TorqueRegressor):
         self._take(whole.z_0, whole.y_0, whole.weights(self.alpha_), whole.spread(self.alpha_), whole.n)
         return self
 
-    def _left_out(
-        self, X: Array, y: Array, alphas: Array, lengths: Sequence[int] | None
-    ) -> tuple[Array, Array]:
+    def _left_out(self, X: Array, y: Array, alphas: Array, lengths: Sequence[int] | None) -> tuple[Array, Array]:
         """Errors of rows left out, and their variances over s^2; both of shape (alphas, n)."""
         n = y.size
         errors, relative = np.empty((alphas.size, n)), np.empty((alphas.size, n))
@@ -150,9 +148,7 @@ class RidgeRegressor(TorqueRegressor):
         )  # fmt: skip
         return self
 
-    def step(
-        self, carry: Mapping[str, Scalar], z: Sequence[Scalar]
-    ) -> tuple[dict[str, Scalar], Scalar, Scalar]:
+    def step(self, carry: Mapping[str, Scalar], z: Sequence[Scalar]) -> tuple[dict[str, Scalar], Scalar, Scalar]:
         """One prediction on scalars."""
         off = [z_i - z_0 for z_i, z_0 in zip(z, self.centre_.tolist(), strict=True)]
         mean = self.offset_ + dot(self.coef_, off)
