@@ -84,7 +84,7 @@ def observer_of(driver: LearnedDriver) -> Observer:
         torque = driver.scaling.torque_mean + driver.scaling.torque_size * mean
         size = driver.scaling.torque_size * sd
         factor = float(driver.calibration.sd(1.0))  # type: ignore[arg-type]
-        return new, {
+        return {key: new[key] for key in carry}, {
             "driver_torque_ahead": select(valid, torque, 0.0),
             "driver_torque_ahead_sd": select(valid, factor * size, 0.0),
             "valid": select(valid, 1.0, 0.0),

@@ -227,6 +227,8 @@ def _rows(
 def _shifted(values: Array, by: int) -> Array:
     """values[k - by] at k; NaN beyond the ends."""
     made = np.full(values.shape, np.nan)
+    if abs(by) >= values.size:
+        return made
     if by >= 0:
         made[by:] = values[: values.size - by]
     else:
