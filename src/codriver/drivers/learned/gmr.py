@@ -52,7 +52,7 @@ class GaussianMixtureRegressor(TorqueRegressor):
 
     def __init__(
         self, components: int | str = "bic", candidates: Sequence[int] = CANDIDATES, paper_weights: bool = False,
-        shrinkage: float = 1.0, floor: float = 1e-6, starts: int = 3, most: int = 200, enough: float = 1e-4,
+        shrinkage: float = 1.0, floor: float = 1e-6, starts: int = 3, most: int = 200, enough: float = 1e-3,
         random_state: int | None = 0,
     ) -> None:  # fmt: skip
         self.components, self.candidates, self.paper_weights = components, candidates, paper_weights
