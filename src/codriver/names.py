@@ -157,6 +157,14 @@ _ENTRIES = (
     # the road
     Quantity("road_slope", "rad", "%", "alpha", "positive uphill", -0.6, 0.6),
     Quantity("road_curvature", "1/m", "1/m", "rho", "positive to the left", -1, 1),
+    Quantity("lateral_offset", "m", "m", "y", "of the centre of mass from the path, positive to the left", -20, 20),
+    Quantity(
+        "heading_error", "rad", "deg", "psi", "heading of the car minus that of the path, positive to the left", -pi, pi
+    ),
+    Quantity(
+        "near_angle", "rad", "deg", "theta_near", "direction of the path's near point, seen from the car", -pi, pi
+    ),
+    Quantity("far_angle", "rad", "deg", "theta_far", "direction of the path's far point, seen from the car", -pi, pi),
     # what codriver estimates
     Quantity("intentional_acceleration", "m/s^2", "m/s^2", "a_i", "acceleration the driver asks for"),
     Quantity("intentional_jerk", "m/s^3", "m/s^3", "j_i", "time derivative of the acceleration the driver asks for"),

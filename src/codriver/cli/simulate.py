@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from codriver.cli.simulate_circuit import circuit
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from codriver.vehicles import Vehicle
 
 app = typer.Typer(help="Simulate a long drive with known truth.", no_args_is_help=True, rich_markup_mode=None)
+app.command("circuit")(circuit)
 
 Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.", show_default=False)]
 Driver = Annotated[str, typer.Option("--driver", help="aggressive, anticipating, ordinary, nervous, smooth or brisk.")]
@@ -68,12 +71,12 @@ def rig(out: Out, seed: Seed = 0, duration: Duration = None, overwrite: Overwrit
     from codriver.cli.terminal import console
     from codriver.errors import UsageError
     from codriver.identify.regression import rms
-    from codriver.simulate.folder import refuse_foreign
+    from codriver.simulate.folder import refuse_earlier, refuse_foreign
     from codriver.simulate.rig import RigSetting
     from codriver.simulate.rig_files import FILES, write_rig
 
     refuse_foreign(out, "rig", FILES)
-    _refuse_earlier(out, overwrite)
+    refuse_earlier(out, overwrite)
     setting = RigSetting()
     if duration is not None:
         if not 5 <= duration <= 3600:
@@ -95,22 +98,6 @@ def rig(out: Out, seed: Seed = 0, duration: Duration = None, overwrite: Overwrit
     )
 
 
-def _refuse_earlier(out: Path, overwrite: bool) -> None:
-    """Refuse a folder that holds files, where they are not to be replaced.
-
-    Raises:
-        UsageError: see there.
-    """
-    from codriver.errors import UsageError
-
-    if not overwrite and out.is_dir() and any(out.iterdir()):
-        raise UsageError(
-            f"--out {out} holds an earlier simulation",
-            "a new or empty folder",
-            "choose another --out, or say --overwrite",
-        )
-
-
 def _simulate(
     out: Path, drive: Callable[[], RoadTest], vehicle: str, nominal: Vehicle | None, overwrite: bool
 ) -> None:  # fmt: skip
@@ -119,9 +106,10 @@ def _simulate(
 
     from codriver.cli.terminal import console, working
     from codriver.simulate import refuse_foreign, write_drive
+    from codriver.simulate.folder import refuse_earlier
 
     refuse_foreign(out, "simulated drive")
-    _refuse_earlier(out, overwrite)
+    refuse_earlier(out, overwrite)
     with working(True, 2) as stage:
         stage("driving")
         test = drive()

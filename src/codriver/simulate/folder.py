@@ -36,6 +36,20 @@ def refuse_foreign(folder: Path, what: str, own: Sequence[str] = _OWN) -> None:
         )
 
 
+def refuse_earlier(out: Path, overwrite: bool) -> None:
+    """Refuse a folder that holds files, where they are not to be replaced.
+
+    Raises:
+        UsageError: see there.
+    """
+    if not overwrite and out.is_dir() and any(out.iterdir()):
+        raise UsageError(
+            f"--out {out} holds an earlier simulation",
+            "a new or empty folder",
+            "choose another --out, or say --overwrite",
+        )
+
+
 def write_folder(folder: Path, write: Callable[[Path], None], what: str, own: Sequence[str] = _OWN) -> None:
     """Let `write` fill a temporary folder, then move its files into `folder`, made if need be.
 

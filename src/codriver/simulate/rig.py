@@ -162,6 +162,17 @@ class RigDrive:
 
 def circuit_curvature(distance: Array) -> Array:
     """Curvature of the circuit at distances along it, 1/m, positive to the left; it closes and begins anew."""
+    edges, values = _edges()
+    return np.interp(np.mod(distance, edges[-1]), edges, values)
+
+
+def circuit_length() -> float:
+    """Length of the circuit, m."""
+    return _edges()[0][-1]
+
+
+def _edges() -> tuple[list[float], list[float]]:
+    """Distances between which the circuit's curvature runs straight, m, and the curvature there, 1/m."""
     edges, values = [0.0], [0.0]
     s = 0.0
     for straight, bend, angle in _CIRCUIT:
@@ -170,7 +181,7 @@ def circuit_curvature(distance: Array) -> Array:
             s += length
             edges.append(s)
             values.append(value)
-    return np.interp(np.mod(distance, s), edges, values)
+    return edges, values
 
 
 def simulate_rig(setting: RigSetting | None = None, *, seed: int = 0) -> RigDrive:

@@ -130,7 +130,8 @@ class FeatureSetting:
         unknown = sorted(set(plain) - set(cls.__dataclass_fields__))
         if unknown:
             raise UsageError(f"settings {unknown}", "settings this version knows", "use a newer version")
-        return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in plain.items()})
+        settings: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in plain.items()}
+        return cls(**settings)
 
 
 HONEST = FeatureSetting()

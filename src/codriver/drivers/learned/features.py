@@ -22,6 +22,7 @@ from codriver.signals import Grid, Log
 from codriver.signals.signal import Array
 
 Index = npt.NDArray[np.intp]
+ESTIMATED = "estimate: "  # begins the source of a torque that `prepare` estimated
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,7 @@ class FeatureTable:
         drive: number of the drive each row is of, shape (n,).
         target: name of the torque.
         left_out: signals that the setting names and the drives lack.
+        estimated: whether the torque is an estimate of ours, from the wheel's angle, and not a sensor's.
     """
 
     X: Array
@@ -65,6 +67,7 @@ class FeatureTable:
     drive: Index
     target: str
     left_out: tuple[str, ...] = ()
+    estimated: bool = False
 
     def __len__(self) -> int:
         return self.y.size
@@ -174,7 +177,7 @@ def features_of(
     lengths = tuple(length for p in parts for length in p[3])
     return FeatureTable(
         X, np.concatenate([p[1] for p in parts]), np.concatenate([p[2] for p in parts]), columns, lengths, number, target,
-        left_out if signals is None else (),
+        left_out if signals is None else (), any(log[target].source.startswith(ESTIMATED) for log in drives),
     )  # fmt: skip
 
 

@@ -73,6 +73,7 @@ class LearnedDriver:
         calibration: of its bands.
         training: what it was learnt from: drives, rows, seconds, spread of the torque; RMSE and coverage on held-out blocks.
         left_out: signals that the drives lack.
+        held: what was foretold on blocks held out in turn, each by a model that had not seen it; not kept in a file.
     """
 
     name: str
@@ -83,9 +84,10 @@ class LearnedDriver:
     features: tuple[Feature, ...]
     scaling: Scaling
     regressor: TorqueRegressor
-    calibration: Calibration = Calibration()
+    calibration: Calibration = field(default_factory=Calibration)
     training: Mapping[str, Any] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
+    held: TorquePrediction | None = field(default=None, repr=False)
 
     def table(self, log: Log | Sequence[Log], with_target: bool = True) -> FeatureTable:
         """Features of drives as this driver wants them.
@@ -114,13 +116,21 @@ class LearnedDriver:
     def predict_table(self, table: FeatureTable) -> TorquePrediction:
         """Foretell the rows of a table, given in the order of time."""
         mean, own_sd = predicted(self.regressor, self.scaling, table)
-        half = self.calibration.half_width(own_sd)
-        made = TorquePrediction(
-            table.time, self.protocol.features.horizon, mean, self.calibration.sd(own_sd), mean - half, mean + half,
-            table.y, table.X[:, table.torque_columns[0]], self.calibration.log_density(table.y - mean, own_sd),
-        )  # fmt: skip
-        order = np.lexsort((table.time, table.drive))
-        return replace(made, **{n: v[order] for n, v in vars(made).items() if isinstance(v, np.ndarray)})
+        return _foretold(table, mean, own_sd, self.calibration, self.protocol.features.horizon)
+
+
+def _foretold(
+    table: FeatureTable, mean: Array, own_sd: Array, calibration: Calibration, horizon: float
+) -> TorquePrediction:
+    """A prediction with its band, in the order of time."""
+    half = calibration.half_width(own_sd)
+    made = TorquePrediction(
+        table.time, horizon, mean, calibration.sd(own_sd), mean - half, mean + half, table.y,
+        table.X[:, table.torque_columns[0]], calibration.log_density(table.y - mean, own_sd),
+    )  # fmt: skip
+    order = np.lexsort((table.time, table.drive))
+    ordered: dict[str, Any] = {n: v[order] for n, v in vars(made).items() if isinstance(v, np.ndarray)}
+    return replace(made, **ordered)
 
 
 def fit_driver(
@@ -168,23 +178,43 @@ def fit_table(
         )
     scaling = scaling or Scaling.of(table)
     regressor = fitted(regressor_of(kind, table, protocol.features, options), scaling, table)
-    folds = time_blocks(table, CALIBRATION_FOLDS, protocol.gap or protocol.features.horizon, protocol.features)
-    z, errors = [], []
+    folds = _calibration_folds(table, protocol)
+    rows, means, sds = [], [], []
     for fold in folds if calibrate else []:
         mean, sd = held_out(table, fold, kind, protocol, options)
-        z.append((table.y[fold.test] - mean) / sd)
-        errors.append(table.y[fold.test] - mean)
-    calibration = Calibration.of(np.concatenate(z)) if z else Calibration()
+        rows.append(fold.test)
+        means.append(mean)
+        sds.append(sd)
+    calibration, held = Calibration(), None
+    if rows:
+        judged, mean, sd = table.take(np.concatenate(rows)), np.concatenate(means), np.concatenate(sds)
+        calibration = Calibration.of((judged.y - mean) / sd)
+        held = _foretold(judged, mean, sd, calibration, protocol.features.horizon)
     tick = protocol.features.tick if protocol.features.dense else protocol.features.dt
     training = {
         "drives": int(np.unique(table.drive).size), "rows": len(table), "minutes": len(table) * tick / 60,
         "torque_rms": float(np.sqrt(np.mean(table.y**2))),
-    } | ({"held_out_rmse": float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))} if errors else {})  # fmt: skip
+    }  # fmt: skip
+    if held is not None:
+        inside = (held.measured >= held.low) & (held.measured <= held.high)
+        training |= {
+            "held_out_rmse": float(np.sqrt(np.mean(held.error**2))), "held_out_inside95": float(np.mean(inside)),
+            "held_out_stays_rmse": float(np.sqrt(np.mean((held.measured - held.last) ** 2))),
+        }  # fmt: skip
     signals = tuple(dict.fromkeys(f.signal for f in table.features if f.signal != table.target))
     return LearnedDriver(
         name, kind, protocol, signals, table.target, table.features, scaling, regressor, calibration, training,
-        table.left_out,
+        table.left_out, held,
     )  # fmt: skip
+
+
+def _calibration_folds(table: FeatureTable, protocol: Protocol) -> list[Fold]:
+    """Drives where there are three or more, since a new drive is what a band has to hold for; else blocks."""
+    drives = np.unique(table.drive)
+    if drives.size < CALIBRATION_FOLDS or protocol.hold_out == "blocks":
+        return time_blocks(table, CALIBRATION_FOLDS, protocol.gap or protocol.features.horizon, protocol.features)
+    group = np.searchsorted(drives, table.drive) % CALIBRATION_FOLDS
+    return [Fold(str(k), np.flatnonzero(group != k), np.flatnonzero(group == k)) for k in range(CALIBRATION_FOLDS)]
 
 
 def held_out(

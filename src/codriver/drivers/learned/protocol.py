@@ -1,7 +1,7 @@
 """How a learned driver is judged: what is held out, what scaling may see, and which leaks a protocol has.
 
-honest      features of the past and the road ahead; scaling from the training part; whole drives held out, or blocks of one drive with
-            a gap on either side
+honest      features of the past and the road ahead; scaling from the training part; whole drives held out, or blocks of one
+            drive with a gap on either side
 paper2019   features that hold the vehicle's states at the very moment, smoothed with hindsight; scaling from the whole record; four
             quarters without a gap
 
@@ -129,8 +129,8 @@ def time_blocks(table: FeatureTable, folds: int, gap: float, setting: FeatureSet
 
 def _spans(table: FeatureTable) -> tuple[np.ndarray, np.ndarray]:
     """First and last time of each drive."""
-    count = int(table.drive.max()) + 1
-    first, last = np.full(count, np.inf), np.full(count, -np.inf)
-    np.minimum.at(first, table.drive, table.time)
-    np.maximum.at(last, table.drive, table.time)
+    first, last = np.zeros(int(table.drive.max()) + 1), np.zeros(int(table.drive.max()) + 1)
+    for drive in np.unique(table.drive):
+        time = table.time[table.drive == drive]
+        first[drive], last[drive] = time.min(), time.max()
     return first, last

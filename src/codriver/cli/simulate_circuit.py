@@ -1,0 +1,68 @@
+"""codriver simulate circuit: a two-point driver on a closed circuit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.", show_default=False)]
+Driver = Annotated[str, typer.Option("--driver", help="anna, ben, carla, david or emma.")]
+Varied = Annotated[
+    bool, typer.Option("--variability/--no-variability", help="A driver whose gains drift and who is noisy.")
+]
+Laps = Annotated[int, typer.Option("--laps", min=1, max=50, help="Laps each way; one takes 2 minutes at 50 km/h.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Another seed, another drive of the same driver.")]
+Ahead = Annotated[str, typer.Option("--anticipation", help="far-point, or mpc: a predictive plan in its place.")]
+Direction = Annotated[str, typer.Option("--direction", help="left, right, or both: first left, then right.")]
+Speed = Annotated[float, typer.Option("--speed", help="km/h, held.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier simulation in that folder.")]
+
+
+def circuit(
+    out: Out,
+    driver: Driver = "anna",
+    variability: Varied = True,
+    laps: Laps = 4,
+    seed: Seed = 0,
+    anticipation: Ahead = "far-point",
+    direction: Direction = "both",
+    speed: Speed = 50.0,
+    overwrite: Overwrite = False,
+) -> None:
+    """Let a two-point visual driver steer by torque round a closed circuit.
+
+    The log has the wheel's angle and the driver's torque by sensors, and what the simulator knows of car and road.
+
+    Example: codriver simulate circuit -o laps --driver ben
+    """
+    from dataclasses import replace
+
+    from codriver.cli.terminal import console
+    from codriver.errors import UsageError
+    from codriver.identify.regression import rms
+    from codriver.simulate.circuit import CircuitSetting
+    from codriver.simulate.circuit_drivers import circuit_driver
+    from codriver.simulate.circuit_files import FILES, write_circuit
+    from codriver.simulate.folder import refuse_earlier, refuse_foreign
+    from codriver.simulate.rig import RigCar
+    from codriver.simulate.variability import Variability
+
+    refuse_foreign(out, "circuit", FILES)
+    refuse_earlier(out, overwrite)
+    if not 10 <= speed <= 120:
+        raise UsageError(f"--speed {speed:g}", "10 to 120 km/h", "choose one of these")
+    setting = CircuitSetting(
+        circuit_driver(driver), Variability() if variability else None, anticipation, laps=laps, direction=direction,
+        car=replace(RigCar(), speed=speed / 3.6),
+    )  # fmt: skip
+    files, drive = write_circuit(out, setting, seed)
+    console().print(
+        f"{driver}, {'varying' if variability else 'always the same'}, anticipation by {anticipation}, seed {seed}\n"
+        f"{drive.time[-1] / 60:.1f} minutes at {speed:g} km/h, {direction}: "
+        f"off the path by {rms(drive.offset):.2f} m (rms), {abs(drive.offset).max():.2f} m at most, "
+        f"driver's torque {rms(drive.driver_torque):.2f} N m (rms)\n"
+        f"wrote {', '.join(str(p) for p in vars(files).values())}",
+        markup=False,
+    )
