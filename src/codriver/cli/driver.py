@@ -24,7 +24,7 @@ Drives = Annotated[list[Path], typer.Argument(metavar="DRIVE...", help="Recordin
 Model = Annotated[
     str,
     typer.Option(
-        "--model", help="blend, ridge, ann, gmr, hmm-gmr, gp, boosting, pwc or pwl; docs/drivers.md says which when."
+        "--model", help="guarded, ridge, ann, gmr, hmm-gmr, gp, boosting, pwc or pwl; docs/drivers.md says which when."
     ),
 ]
 ProtocolName = Annotated[
@@ -49,7 +49,7 @@ def fit(
     out: Annotated[
         Path, typer.Option("-o", "--out", metavar="NAME.driver", help="Driver file to write.", show_default=False)
     ],
-    model: Model = "blend", name: Annotated[
+    model: Model = "guarded", name: Annotated[
         str | None, typer.Option("--name", help="Whose it is. Default: the file's name.", show_default=False)
     ] = None,
     dbc: Dbc = None, names: Names = None, bus: Bus = None, vehicle: VehicleName = None, protocol: ProtocolName = "honest",
@@ -88,7 +88,7 @@ def evaluate(
     drives: Drives,
     models: Annotated[
         list[str] | None,
-        typer.Option("--model", help="Of which models; may be repeated, 'all' takes every one.", show_default="blend"),
+        typer.Option("--model", help="Of which models; may be repeated, 'all' takes every one.", show_default="guarded"),
     ] = None,
     dbc: Dbc = None, names: Names = None, bus: Bus = None, vehicle: VehicleName = None, protocol: ProtocolName = "honest",
     horizon: Horizon = None, folds: Annotated[int, typer.Option("--folds", min=2, help="Blocks, where one drive is given.")] = 4,

@@ -17,7 +17,7 @@ from codriver.signals.signal import Array
 FULL = {
     "pwc": "the torque stays (3)", "pwl": "its slope stays (4)", "ridge": "ridge", "ann": "neural net (26)",
     "gp": "Gaussian process (16)", "gmr": "GMR (23)", "hmm-gmr": "HMM-GMR (25)", "boosting": "boosted ridge",
-    "blend": "blend (default)",
+    "guarded": "guarded (default)",
 }  # fmt: skip
 SHOWN = 120.0  # s of a drive, at most, so that single movements can be seen
 

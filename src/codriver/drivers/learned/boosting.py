@@ -125,9 +125,7 @@ class BoostedRidge(TorqueRegressor):
         self.n_features_in_ = self.ridge_.n_features_in_
         return self
 
-    def step(
-        self, carry: Mapping[str, Scalar], z: Sequence[Scalar]
-    ) -> tuple[dict[str, Scalar], Scalar, Scalar]:
+    def step(self, carry: Mapping[str, Scalar], z: Sequence[Scalar]) -> tuple[dict[str, Scalar], Scalar, Scalar]:
         """One prediction on scalars."""
         linear = self.ridge_.step({}, z)[1]
         return {}, self.trees_.total(linear, lambda feature: z[feature], select), self.sd_

@@ -48,7 +48,7 @@ class FeatureSetting:
     dt: float = 0.2
     history: int = 5
     horizon: float = 0.2
-    substeps: int = 4
+    substeps: int = 2
     dense: bool = True
     past: tuple[str, ...] = (
         "steering_wheel_angle",

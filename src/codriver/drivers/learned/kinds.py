@@ -1,6 +1,6 @@
 """The kinds of learned drivers, by name.
 
-blend      the default: ridge and boosted trees, half each      boosting   trees on what ridge leaves
+guarded    the default: boosted ridge on the change, guarded    boosting   trees on what ridge leaves
 ridge      linear in the features (ARX)                         ann        one hidden layer of tanh (26)
 gp         Gaussian process (9)-(19), sparse on long drives     gmr        Gaussian mixture regression (20)-(23)
 hmm-gmr    the same with memory (24)-(25)                       pwc, pwl   the torque stays; its slope stays (3)-(5)
@@ -17,13 +17,13 @@ from codriver.drivers.learned.features import FeatureTable
 from codriver.drivers.learned.regressor import TorqueRegressor
 from codriver.errors import UsageError
 
-DEFAULT = "blend"
+DEFAULT = "guarded"
 BASELINES = ("pwc", "pwl", "ridge")  # in every table
 _WHERE = {
     "pwc": ("naive", "PiecewiseConstant"), "pwl": ("naive", "PiecewiseLinear"), "ridge": ("ridge", "RidgeRegressor"),
     "ann": ("network", "NetworkRegressor"), "gp": ("process", "GaussianProcessTorque"),
     "gmr": ("gmr", "GaussianMixtureRegressor"), "hmm-gmr": ("hmm_gmr", "HiddenMarkovRegressor"),
-    "boosting": ("boosting", "BoostedRidge"), "blend": ("blend", "BlendedRegressor"),
+    "boosting": ("boosting", "BoostedRidge"), "guarded": ("guarded", "GuardedRegressor"),
 }  # fmt: skip
 KINDS = tuple(_WHERE)
 
@@ -60,6 +60,7 @@ def regressor_of(
     columns = table.torque_columns
     told: dict[str, Any] = {
         "last": columns[0], "before": columns[1], "ahead": setting.horizon / setting.dt, "gap": gap_rows(setting),
+        "newest": newest_columns(table),
     }  # fmt: skip
     unknown = sorted(set(options or {}) - set(known))
     if unknown:
@@ -67,6 +68,12 @@ def regressor_of(
         raise UsageError(f"{kind} has no parameter {', '.join(unknown)}", f"one of: {own}", "correct the name")
     made.set_params(**{k: v for k, v in told.items() if k in known}, **(options or {}))
     return made
+
+
+def newest_columns(table: FeatureTable) -> list[int]:
+    """For each column the column with the newest value of its signal: itself, for the newest and for what is not of the past."""
+    now = {f.signal: k for k, f in enumerate(table.features) if f.kind == "past" and f.when == 0}
+    return [now.get(f.signal, k) if f.kind in ("past", "preview") else k for k, f in enumerate(table.features)]
 
 
 def gap_rows(setting: FeatureSetting) -> int:

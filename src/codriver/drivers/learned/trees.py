@@ -93,8 +93,11 @@ class Trees:
     @classmethod
     def restored(cls, state: Mapping[str, Any]) -> Self:
         """From what `state` gave; arrays may come as lists."""
-        whole = {name: np.asarray(state[name], dtype=np.int64) for name in ("roots", "left", "right", "feature")}
-        return cls(**whole, **{name: np.asarray(state[name], dtype=np.float64) for name in ("threshold", "value")})
+        whole: dict[str, Any] = {
+            name: np.asarray(state[name], dtype=np.int64) for name in ("roots", "left", "right", "feature")
+        }
+        real: dict[str, Any] = {name: np.asarray(state[name], dtype=np.float64) for name in ("threshold", "value")}
+        return cls(**whole, **real)
 
 
 def greatest_double(threshold: Array) -> Array:
