@@ -9,8 +9,8 @@
 [-w', 1]/s: so the weights w of (22) and s come out of the factor without another inverse, and the leading block of W is that of z.
 
 The weights h_i come from a prior p_i and the density of z, h_i ~ p_i exp(l_i(z) - max l(z)). The largest exponent is 0, so with
-all p_i above 0 the sum is too: however far away z is (short of squares that
-overflow), h is that of the components nearest to it, and T their linear forms.
+all p_i above 0 the sum is too: however far away z is (short of squares that overflow), h is that of the components nearest
+to it, and T their linear forms.
 """
 
 from __future__ import annotations

@@ -106,11 +106,14 @@ class Regularisation:
         """The maximum for rows X (n, D) and responsibilities R (n, N), whose columns sum to more than 0."""
         counts = R.sum(axis=0)
         means = (R.T @ X) / counts[:, np.newaxis]
-        covariances = np.empty((counts.size, X.shape[1], X.shape[1]))
-        for i, mean in enumerate(means):
-            e = (X - mean) * np.sqrt(R[:, i : i + 1])
-            covariances[i] = (e.T @ e + self.shrinkage * self.pooled) / (counts[i] + self.shrinkage)
-        return Gaussians.of(means, self.floored(covariances))
+        roots = np.sqrt(R)
+        sums = np.tile(self.shrinkage * self.pooled, (counts.size, 1, 1))
+        for first in range(0, X.shape[0], ROWS):
+            part = slice(first, first + ROWS)
+            for i, mean in enumerate(means):
+                e = (X[part] - mean) * roots[part, i : i + 1]
+                sums[i] += e.T @ e
+        return Gaussians.of(means, self.floored(sums / (counts + self.shrinkage)[:, np.newaxis, np.newaxis]))
 
     def floored(self, covariances: Array) -> Array:
         """With eigenvalues of at least the floor, shape (N, D, D)."""

@@ -60,7 +60,7 @@ class HiddenMarkovRegressor(TorqueRegressor):
 
     def __init__(
         self, components: int | str = "bic", candidates: Sequence[int] = CANDIDATES, shrinkage: float = 1.0,
-        floor: float = 1e-6, starts: int = 3, most: int = 200, enough: float = 1e-4, random_state: int | None = 0,
+        floor: float = 1e-6, starts: int = 3, most: int = 200, enough: float = 1e-3, random_state: int | None = 0,
     ) -> None:  # fmt: skip
         self.components, self.candidates = components, candidates
         self.shrinkage, self.floor, self.starts, self.most = shrinkage, floor, starts, most

@@ -46,7 +46,7 @@ class EmSettings:
     floor: float = 1e-6
     starts: int = 3
     most: int = 200
-    enough: float = 1e-4
+    enough: float = 1e-3
 
     def __post_init__(self) -> None:
         """Refuse what cannot be.
