@@ -21,6 +21,7 @@ from codriver.cli import (
     export,
     identify_alignment,
     info,
+    plot,
     reproduce,
     simulate,
     smooth,
@@ -46,6 +47,7 @@ app.add_typer(identify_alignment.app, name="identify")
 app.command("tune")(tune.tune)
 app.command("style")(style.style)
 app.add_typer(check.app, name="check")
+app.add_typer(plot.app, name="plot")
 app.add_typer(simulate.app, name="simulate")
 app.command("reproduce")(reproduce.reproduce)
 app.add_typer(export.app, name="export")

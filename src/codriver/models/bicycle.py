@@ -198,8 +198,3 @@ def bicycle_lpv(matrices: BicycleMatrices) -> LPV:
     return LPV(
         {k: np.block(part) for k, part in parts.items()}, np.vstack([Z, inverse]), np.eye(4), STATES, INPUTS, STATES
     )
-
-
-def is_bicycle(vehicle: Vehicle) -> bool:
-    """Whether a vehicle has every parameter of the bicycle."""
-    return all(name in vehicle for name in LETTERS.values())

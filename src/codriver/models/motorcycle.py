@@ -216,8 +216,3 @@ def motorcycle_model(p: MotorcycleParameters) -> LPV:
         C[row, STATES.index(name)] = 1
     C[4, 6:] = 1 / p.mass
     return LPV({0: inverse @ m.A0, 1: inverse @ m.A1}, inverse @ m.B, C, STATES, INPUTS, MEASURED)
-
-
-def is_motorcycle(vehicle: Vehicle) -> bool:
-    """Whether a vehicle has every parameter of Sharp's model."""
-    return all(name in vehicle for name in LETTERS.values())
