@@ -11,7 +11,12 @@ import pytest
 import codriver as cd
 from codriver.errors import DesignError
 from codriver.models import MotorcycleParameters, motorcycle_model
+from codriver.observers.differentiator import algebraic_differentiator
 from codriver.observers.motorcycle_lmi import MotorcycleLMI, certify_gains, design_motorcycle_lmi
+from codriver.observers.motorcycle_ts import motorcycle_ts_observer
+from codriver.observers.observer import chain
+from codriver.observers.road_frame import road_frame_observer
+from codriver.testing import check_observer
 
 pytest.importorskip("cvxpy")
 LOW, HIGH = 30 / 3.6, 110 / 3.6
@@ -173,3 +178,86 @@ class TestRefusal:
         edge = replace(design, fastest=np.abs(design.certificate.eigenvalues).max() * 0.99)
         with pytest.raises(DesignError, match="radius"):
             recertify(edge)
+
+
+def run(observer, signals: dict[str, np.ndarray], missing: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    size = next(iter(signals.values())).size
+    there = np.ones(size, bool)
+    flags = {name: there if missing is None or name == "longitudinal_speed" else ~missing for name in observer.channels}
+    return cd.compile(observer).run_grid(cd.Grid(np.arange(size) * observer.dt, observer.dt, signals, flags, flags))
+
+
+def measured(design: MotorcycleLMI, size: int, speeds: np.ndarray, seed: int = 7) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    y = np.cumsum(rng.standard_normal((size, 5)), axis=0) * design.scaling.noise
+    return {"longitudinal_speed": speeds} | dict(zip(design.model.outputs, y.T, strict=True))
+
+
+class TestStep:
+    @pytest.mark.parametrize("dt", [0.001, 0.01, 0.03])
+    def test_is_the_exact_discretisation(self, model, dt):
+        """Against the matrix exponential of scipy with measurements that run straight, at speeds that jump, also outside."""
+        from scipy.linalg import expm
+
+        made = design_motorcycle_lmi(model, LOW, HIGH, dt)
+        size = 120
+        speeds = np.random.default_rng(6).uniform(0.8 * LOW, 1.2 * HIGH, size)
+        signals = measured(made, size, speeds)
+        found = run(motorcycle_ts_observer(made), signals)
+        x, y = np.zeros(9), np.array([signals[name] for name in model.outputs]).T
+        for k in range(1, size):
+            big = np.zeros((19, 19))
+            big[:9, :9], big[:9, 9:14], big[9:14, 14:] = made.error_matrix(speeds[k]), made.gain(speeds[k]), np.eye(5)
+            state = np.concatenate([x, y[k - 1], (y[k] - y[k - 1]) / dt])
+            x = (expm(big * dt) @ state)[:9]
+            got = np.array([found[name][k] for name in model.states])
+            assert np.abs((got - x) / made.scaling.errors).max() < 1e-5, k
+        outside = (speeds < LOW) | (speeds > HIGH)
+        assert outside.any()
+        assert np.array_equal(found["certified"] == 0, outside)
+
+    def test_checklist(self, design):
+        check_observer(motorcycle_ts_observer(design), rows=60)
+
+    def test_valid(self, design):
+        """After a gap the flag comes back as late as the slowest pole needs."""
+        observer, size = motorcycle_ts_observer(design), 1500
+        missing = np.zeros(size, bool)
+        missing[700:703] = True
+        found = run(observer, measured(design, size, np.full(size, 20.0)), missing)
+        wait = int(observer.settings["settling"] / 0.01)
+        assert found["valid"][wait + 5] == 1
+        assert (found["valid"][700 : 703 + wait - 2] == 0).all()
+        assert found["valid"][703 + wait + 5] == 1
+        assert (found["measured"][700:703] == 0).all()
+
+    def test_from_sensors_of_a_leaning_machine(self, design):
+        """Encoder of 4096 counts, gyroscope in the body, speed; the rate by a slope, the frame by the turn: one chain."""
+        from scipy.signal import lsim
+
+        dt, v = 0.01, 9.0
+        A, t = design.model.A(v), np.arange(0, 20, 0.01)
+        torque_rate = 10 * np.cos(2 * t)
+        _, _, x = lsim((A, design.model.B, np.eye(9), np.zeros((9, 1))), torque_rate, t)
+        rng, count = np.random.default_rng(8), 2 * np.pi / 4096
+        state = dict(zip(design.model.states, x.T, strict=True))
+        signals = {
+            "longitudinal_speed": np.full(t.size, v),
+            "steer_angle": np.round(state["steer_angle"] / count) * count,
+            "yaw_rate": state["yaw_rate"] * np.cos(state["roll_angle"]) + 0.003 * rng.standard_normal(t.size),
+            "roll_rate": state["roll_rate"] + 0.003 * rng.standard_normal(t.size),
+        }
+        front = chain(road_frame_observer(dt), algebraic_differentiator(dt))
+        found = run(chain(front, motorcycle_ts_observer(design), "motorcycle-ts"), signals)
+        late = t > 8
+        assert found["valid"][late].all()
+        roll = np.sqrt(np.mean((found["roll_angle"] - state["roll_angle"])[late] ** 2))
+        # 0.48 degrees of 6.4, nearly all of it because a = v W leaves out v_y' and the roll's acceleration
+        assert roll < 0.1 * state["roll_angle"][late].std()
+        torque = np.sqrt(np.mean((found["rider_torque"] - state["rider_torque"])[late] ** 2))
+        assert torque < 0.12 * state["rider_torque"][late].std()
+
+    def test_refusals(self, design):
+        free = design_motorcycle_lmi(design.model, LOW, HIGH, 0.01, fastest=None)
+        with pytest.raises(DesignError, match="poles up to"):
+            motorcycle_ts_observer(free)
