@@ -57,6 +57,7 @@ class TestBicycle:
         assert bicycle.of("capsize")[k, 0].real == pytest.approx(-0.32286642900409, abs=1e-8)
         assert np.sort(bicycle.of("weave")[0].real) == pytest.approx([3.13164324790656, 5.53094371765393])
 
+    @pytest.mark.slow
     def test_the_package_bicycleparameters(self):
         """Eigenvalues of its own benchmark file by its own code."""
         package = pytest.importorskip("bicycleparameters")

@@ -62,6 +62,7 @@ class TestDesign:
             assert poles.real.max() < -1
             assert np.abs(poles).max() < 300
 
+    @pytest.mark.slow
     def test_region_costs_little_gain_and_saves_the_poles(self, model, design):
         """With the noise that the paper adds, 7.5 % of the largest values, at 100 Hz."""
         degree = np.pi / 180
@@ -71,17 +72,20 @@ class TestDesign:
         assert free.gamma < held.gamma < 1.03 * free.gamma
         assert np.abs(free.certificate.eigenvalues).max() > 1e5
 
+    @pytest.mark.slow
     def test_scheduling_the_gain_earns_little(self, model, design):
         constant = design_motorcycle_lmi(model, LOW, HIGH, 0.01, scheduled=False)
         assert np.array_equal(constant.L[0], constant.L[1])
         assert design.gamma * (1 - 1e-5) < constant.gamma < 1.01 * design.gamma
 
+    @pytest.mark.slow
     def test_given_gamma(self, model):
         made = design_motorcycle_lmi(model, LOW, HIGH, 0.01, gamma=0.2)
         assert made.gamma <= 0.2
         with pytest.raises(DesignError, match=r"gamma = 0\.05"):
             design_motorcycle_lmi(model, LOW, HIGH, 0.01, gamma=0.05)
 
+    @pytest.mark.slow
     def test_gamma_means_nothing_without_units(self, model, design):
         """Torque and steer rate weighed ten times less: another gamma, and no better observer."""
         quiet = design_motorcycle_lmi(model, LOW, HIGH, 0.01, errors={"rider_torque": 50.0, "steer_rate": 0.35})
@@ -93,6 +97,7 @@ class TestDesign:
         assert "forward Euler rule it would be unstable" in design.certificate.claims[-1]
         assert np.abs(design.certificate.discrete_eigenvalues).max() < 1
 
+    @pytest.mark.slow
     def test_changing_speed(self, design):
         """V falls in every tick of a ride whose speed jumps at random within the range; outside nothing is promised."""
         from scipy.linalg import expm
@@ -194,7 +199,7 @@ def measured(design: MotorcycleLMI, size: int, speeds: np.ndarray, seed: int = 7
 
 
 class TestStep:
-    @pytest.mark.parametrize("dt", [0.001, 0.01, 0.03])
+    @pytest.mark.parametrize("dt", [0.01, *(pytest.param(dt, marks=pytest.mark.slow) for dt in (0.001, 0.03))])
     def test_is_the_exact_discretisation(self, model, dt):
         """Against the matrix exponential of scipy with measurements that run straight, at speeds that jump, also outside."""
         from scipy.linalg import expm
