@@ -22,6 +22,7 @@ from codriver.cli import (
     export,
     identify_alignment,
     info,
+    plot,
     reproduce,
     simulate,
     smooth,
@@ -48,6 +49,7 @@ app.command("tune")(tune.tune)
 app.command("style")(style.style)
 app.add_typer(driver_use.app, name="driver")
 app.add_typer(check.app, name="check")
+app.add_typer(plot.app, name="plot")
 app.add_typer(simulate.app, name="simulate")
 app.command("reproduce")(reproduce.reproduce)
 app.add_typer(export.app, name="export")

@@ -18,12 +18,23 @@ from math import cos, sin
 
 import numpy as np
 
+from codriver.models.lpv import LPV
 from codriver.models.state_space import StateSpace
 from codriver.signals.signal import Array
+from codriver.vehicles import Vehicle
 
 STATES = ("roll_angle", "steer_angle", "roll_rate", "steer_rate")
 INPUTS = ("roll_moment", "rider_torque")
 GRAVITY = 9.81  # m/s^2
+# The paper's letter and the name in a vehicle file, where heights are positive.
+LETTERS = {
+    "w": "wheelbase", "c": "trail", "lam": "steer_axis_tilt", "rR": "rear_wheel_radius", "mR": "rear_wheel_mass",
+    "IRxx": "rear_wheel_inertia", "IRyy": "rear_wheel_spin_inertia", "xB": "frame_forward", "zB": "frame_height",
+    "mB": "frame_mass", "IBxx": "frame_roll_inertia", "IBxz": "frame_product_of_inertia", "IBzz": "frame_yaw_inertia",
+    "xH": "fork_forward", "zH": "fork_height", "mH": "fork_mass", "IHxx": "fork_roll_inertia",
+    "IHxz": "fork_product_of_inertia", "IHzz": "fork_yaw_inertia", "rF": "front_wheel_radius", "mF": "front_wheel_mass",
+    "IFxx": "front_wheel_inertia", "IFyy": "front_wheel_spin_inertia",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -67,6 +78,16 @@ class BicycleParameters:
     IFxx: float
     IFyy: float
     g: float = GRAVITY
+
+    @classmethod
+    def from_vehicle(cls, vehicle: Vehicle) -> BicycleParameters:
+        """A vehicle's bicycle.
+
+        Raises:
+            VehicleError: the vehicle lacks a parameter.
+        """
+        own = {letter: vehicle.number(name) for letter, name in LETTERS.items()}
+        return cls(**{**own, "zB": -own["zB"], "zH": -own["zH"]})
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,4 +180,21 @@ def bicycle_model(matrices: BicycleMatrices, speed: float) -> StateSpace:
         states=STATES,
         inputs=INPUTS,
         outputs=STATES,
+    )
+
+
+def bicycle_lpv(matrices: BicycleMatrices) -> LPV:
+    """The bicycle at all speeds: A is quadratic in the speed. Inputs, states and outputs are those of `bicycle_model`.
+
+    Args:
+        matrices: in ISO axes (`BicycleMatrices.to_iso`).
+    """
+    inverse, Z = np.linalg.inv(matrices.M), np.zeros((2, 2))
+    parts = {
+        0: [[Z, np.eye(2)], [-inverse @ matrices.K0 * matrices.g, Z]],
+        1: [[Z, Z], [Z, -inverse @ matrices.C1]],
+        2: [[Z, Z], [-inverse @ matrices.K2, Z]],
+    }
+    return LPV(
+        {k: np.block(part) for k, part in parts.items()}, np.vstack([Z, inverse]), np.eye(4), STATES, INPUTS, STATES
     )

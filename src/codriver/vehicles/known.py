@@ -73,3 +73,55 @@ KNOWN: dict[str, Known] = {
         "1", 0, 2, False, "q, share of the lateral acceleration at the road's speed that its bank takes over"
     ),
 }
+
+# Two-wheelers. Letters with a small index are Sharp's (codriver.models.motorcycle), others Meijaard's (codriver.models.bicycle).
+_TWO_WHEELER: dict[str, Known] = {
+    "steer_axis_tilt": Known("rad", 0, 1.2, False, "eps or lambda, tilt of a two-wheeler's steer axis"),
+    "normal_trail": Known("m", -0.2, 0.5, False, "t, of the front contact from the steer axis, across the axis"),
+    "trail": Known("m", -0.2, 0.5, False, "c, of the front contact behind the steer axis, along the road"),
+    "front_wheel_radius": Known("m", 0.05, 1, False, "R_f, r_F"),
+    "rear_wheel_radius": Known("m", 0.05, 1, False, "R_r, r_R"),
+    "front_wheel_spin_inertia": Known("kg*m^2", 0, 10, False, "i_fy, I_Fyy, of the front wheel about its axle"),
+    "rear_wheel_spin_inertia": Known(
+        "kg*m^2", 0, 10, False, "i_ry, I_Ryy, of the rear wheel and all that turns with it"
+    ),
+    "front_frame_mass": Known("kg", 0.1, 500, False, "M_f, of all that steers, front wheel included"),
+    "rear_frame_mass": Known("kg", 1, 2000, False, "M_r, of the rest, rear wheel and rider included"),
+    "rear_frame_roll_inertia": Known("kg*m^2", 0, 500, False, "I_rx, of the rear frame about its mass centre"),
+    "rear_frame_yaw_inertia": Known("kg*m^2", 0, 500, False, "I_rz, of the rear frame about its mass centre"),
+    "rear_frame_product_of_inertia": Known("kg*m^2", -200, 200, False, "C_rxz, integral of x z dm, z downwards"),
+    "front_frame_roll_inertia": Known("kg*m^2", 0, 100, False, "I_fx, of the front frame, across the steer axis"),
+    "front_frame_steer_inertia": Known("kg*m^2", 0, 100, False, "I_fz, of the front frame, along the steer axis"),
+    "steer_axis_distance": Known(
+        "m", 0, 5, False, "a, of the steer axis from the road point below the rear frame's mass centre, across the axis"
+    ),
+    "rear_axle_distance": Known("m", 0, 5, False, "b, of the rear contact from that point"),
+    "front_frame_forward": Known("m", -1, 1, False, "e, of the front frame's mass centre in front of the steer axis"),
+    "front_frame_along": Known(
+        "m", -1, 1, False, "f, height of the front frame's mass centre along the steer axis, over the foot of a"
+    ),
+    "rear_frame_height": Known("m", 0, 3, False, "h, of the rear frame's mass centre"),
+    "front_camber_stiffness": Known("N/rad", -1e5, 1e5, False, "C_f2, lateral force of the front tyre per camber"),
+    "rear_camber_stiffness": Known("N/rad", -1e5, 1e5, False, "C_r2, lateral force of the rear tyre per camber"),
+    "front_relaxation_length": Known("m", 1e-3, 5, False, "sigma_f, over which the front tyre builds up its force"),
+    "rear_relaxation_length": Known("m", 1e-3, 5, False, "sigma_r, over which the rear tyre builds up its force"),
+    "steer_damping": Known("N*m*s/rad", 0, 100, False, "K, of a two-wheeler's steering damper"),
+    "front_wheel_load": Known("N", 0, 2e4, False, "-Z_f, static load of the front wheel"),
+    "rear_wheel_mass": Known("kg", 0, 200, False, "m_R"),
+    "rear_wheel_inertia": Known("kg*m^2", 0, 10, False, "I_Rxx, of the rear wheel about a diameter"),
+    "frame_forward": Known("m", -1, 5, False, "x_B, of frame and rider's mass centre in front of the rear contact"),
+    "frame_height": Known("m", 0, 3, False, "-z_B, of frame and rider's mass centre"),
+    "frame_mass": Known("kg", 0.1, 2000, False, "m_B, of frame and rider without wheels and fork"),
+    "frame_roll_inertia": Known("kg*m^2", 0, 500, False, "I_Bxx, about its mass centre"),
+    "frame_product_of_inertia": Known("kg*m^2", -200, 200, False, "I_Bxz, minus the integral of x z dm, z downwards"),
+    "frame_yaw_inertia": Known("kg*m^2", 0, 500, False, "I_Bzz, about its mass centre"),
+    "fork_forward": Known("m", -1, 5, False, "x_H, of fork and handlebar's mass centre in front of the rear contact"),
+    "fork_height": Known("m", 0, 3, False, "-z_H, of fork and handlebar's mass centre"),
+    "fork_mass": Known("kg", 0.01, 200, False, "m_H, of fork and handlebar without the wheel"),
+    "fork_roll_inertia": Known("kg*m^2", 0, 100, False, "I_Hxx, about its mass centre"),
+    "fork_product_of_inertia": Known("kg*m^2", -20, 20, False, "I_Hxz, minus the integral of x z dm, z downwards"),
+    "fork_yaw_inertia": Known("kg*m^2", 0, 100, False, "I_Hzz, about its mass centre"),
+    "front_wheel_mass": Known("kg", 0, 200, False, "m_F"),
+    "front_wheel_inertia": Known("kg*m^2", 0, 10, False, "I_Fxx, of the front wheel about a diameter"),
+}
+KNOWN |= _TWO_WHEELER
