@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from driven import driven
 
 from codriver.drivers.learned.feature_setting import HONEST, PAPER2019, FeatureSetting
 from codriver.drivers.learned.features import features_of
@@ -14,6 +13,7 @@ from codriver.drivers.learned.scaling import Scaling
 from codriver.drivers.learned.smoothing import local_quadratic, low_pass
 from codriver.errors import LogError, MissingSignal, UsageError
 from codriver.signals import Log, Signal
+from driven import driven
 
 STATES = ("road_curvature", "sideslip_angle", "yaw_rate", "steering_wheel_angle")
 
@@ -114,7 +114,9 @@ def test_the_road_ahead_is_where_the_vehicle_will_be() -> None:
     speed = np.where(np.arange(n) < 200, 5.0, 10.0)
     ahead = curvature_ahead(curvature, speed, dt, (1.0,))
     assert np.isclose(ahead[100, 0], curvature[110])
-    assert np.isclose(ahead[195, 0], curvature[np.searchsorted(np.cumsum(speed * dt), np.cumsum(speed * dt)[195] + 5)], atol=0.05)
+    assert np.isclose(
+        ahead[195, 0], curvature[np.searchsorted(np.cumsum(speed * dt), np.cumsum(speed * dt)[195] + 5)], atol=0.05
+    )
 
 
 def test_low_pass_has_its_step_response() -> None:

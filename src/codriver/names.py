@@ -171,10 +171,25 @@ _ENTRIES = (
     Quantity("acceleration_offset", "m/s^2", "m/s^2", "o_a", "accelerometer offset: g sin(slope) + bias"),
     Quantity("planned_acceleration", "m/s^2", "m/s^2", "a_p", "acceleration a simulated driver planned (truth)"),
     Quantity("planned_jerk", "m/s^3", "m/s^3", "j_p", "time derivative of planned_acceleration (truth)"),
+    Quantity("driver_torque_ahead", "N*m", "N*m", "T_dr", "torque a driver model foretells"),
     Quantity("known_input", "m/s^2", "m/s^2", "u", "what the powertrain adds to the driver's intention"),
 )
 
-VOCABULARY: dict[str, Quantity] = {entry.name: entry for entry in _ENTRIES}
+AHEAD = 20  # places ahead at which the road's curvature has a name
+_ROAD_AHEAD = tuple(
+    Quantity(
+        f"road_curvature_ahead_{k}",
+        "1/m",
+        "1/m",
+        f"rho_{k}",
+        f"at the place reached in {k} of a driver model's steps",
+        -1,
+        1,
+    )
+    for k in range(1, AHEAD + 1)
+)
+
+VOCABULARY: dict[str, Quantity] = {entry.name: entry for entry in (*_ENTRIES, *_ROAD_AHEAD)}
 
 
 def quantity(name: str) -> Quantity:

@@ -18,6 +18,7 @@ from math import isfinite
 from typing import Any, Self
 
 from codriver.errors import UsageError
+from codriver.names import AHEAD
 
 TARGETS = ("driver_torque", "steering_wheel_torque")  # the first that a log has is learnt
 STATES = ("road_curvature", "sideslip_angle", "yaw_rate", "steering_wheel_angle")  # of eq. (1), in its order
@@ -83,8 +84,8 @@ class FeatureSetting:
                 f"a horizon of {self.horizon:g} s with ticks of {self.tick:g} s", "a whole number of ticks",
                 "choose another horizon or other substeps",
             )  # fmt: skip
-        if self.preview < 0:
-            raise UsageError(f"a preview of {self.preview:g} s", "0 or more", "choose another")
+        if not 0 <= self.preview <= AHEAD * self.dt + 1e-9:
+            raise UsageError(f"a preview of {self.preview:g} s", f"0 to {AHEAD * self.dt:g} s", "choose another")
 
     @property
     def tick(self) -> float:

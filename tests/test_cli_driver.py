@@ -1,0 +1,117 @@
+"""codriver driver: fit, evaluate, compare, predict and export, as a user meets them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from typer.testing import CliRunner
+
+from codriver.cli.app import app
+from codriver.errors import CodriverError
+from codriver.simulate.circuit import CircuitSetting
+from codriver.simulate.circuit_drivers import circuit_driver
+from codriver.simulate.circuit_files import write_circuit
+from codriver.simulate.variability import Variability
+
+
+@pytest.fixture(scope="module")
+def laps(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A lap each of two drivers, and a second lap of the first."""
+    folder = tmp_path_factory.mktemp("laps")
+    for name, driver, seed in (("anna", "anna", 1), ("anna2", "anna", 2), ("carla", "carla", 3)):
+        setting = CircuitSetting(driver=circuit_driver(driver), variability=Variability(), laps=1, direction="left")
+        write_circuit(folder / name, setting, seed=seed)
+        (folder / name / "drive.csv").rename(folder / f"{name}.csv")
+    return folder
+
+
+def ran(*words: object) -> str:
+    """What a command says; it must end well."""
+    done = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+def names(laps: Path) -> tuple[str, Path]:
+    """The names file's option."""
+    return "--names", laps / "anna" / "names.toml"
+
+
+def test_from_drives_to_a_driver_to_torques_foretold(laps: Path, tmp_path: Path) -> None:
+    driver, report = tmp_path / "anna.driver", tmp_path / "anna.html"
+    said = ran("driver", "fit", laps / "anna.csv", *names(laps), "--model", "ridge", "-o", driver, "--report", report)
+    assert "anna: ridge learnt from anna" in said
+    assert "left out, since the drives lack it: lateral_acceleration" in said
+    page = report.read_text()
+    assert "How anna steers" in page
+    assert "learnt from" in page
+    out = tmp_path / "foretold.parquet"
+    told = json.loads(ran("driver", "predict", driver, laps / "anna2.csv", *names(laps), "-o", out, "--json"))
+    table = pq.read_table(out)
+    assert table.num_rows == told["rows"]
+    mean, then = (table[name].to_numpy() for name in ("driver_torque_ahead", "driver_torque_then"))
+    assert np.sqrt(np.nanmean((mean - then) ** 2)) == pytest.approx(told["rmse_Nm"])
+    assert told["rmse_Nm"] < 0.9 * told["stays_rmse_Nm"]
+    assert 0.85 < told["inside95"] < 1
+
+
+def test_evaluate_holds_drives_out_and_says_who_wins(laps: Path, tmp_path: Path) -> None:
+    report = tmp_path / "judged.html"
+    command = ("driver", "evaluate", laps / "anna.csv", laps / "anna2.csv", *names(laps), "--model", "ridge", "--both")
+    told = json.loads(ran(*command, "--report", report, "--json"))
+    assert told["protocols"]["honest"]["folds"] == ["anna", "anna2"]
+    assert told["protocols"]["paper2019"]["folds"] == ["A", "B", "C", "D"]
+    honest, paper = (told["protocols"][n]["models"]["ridge"]["ratio_to_pwc"] for n in ("honest", "paper2019"))
+    assert paper < 0.5 * honest < 0.5
+    assert any("beats pwc" in f["text"] for f in told["findings"])
+    page = report.read_text()
+    assert "What the leak is worth" in page
+    assert "inverse dynamics" in page
+    said = ran("driver", "evaluate", laps / "anna.csv", *names(laps), "--model", "ridge", "--folds", "2")
+    assert "held out in turn: A, B" in said
+    assert "verdict" in said
+
+
+def test_compare_names_the_driver(laps: Path, tmp_path: Path) -> None:
+    for name in ("anna", "carla"):
+        ran("driver", "fit", laps / f"{name}.csv", *names(laps), "--model", "ridge", "-o", tmp_path / f"{name}.driver")
+    stored = (tmp_path / "carla.driver", tmp_path / "anna.driver")
+    told = json.loads(ran("driver", "compare", laps / "anna2.csv", *stored, *names(laps), "--json"))
+    assert [one["name"] for one in told["drivers"]] == ["anna", "carla"]
+    assert sum(one["share"] for one in told["drivers"]) == pytest.approx(1)
+    assert "anna" in ran("driver", "compare", laps / "anna2.csv", *stored, *names(laps)).splitlines()[0]
+
+
+def test_export_writes_c(laps: Path, tmp_path: Path) -> None:
+    driver = tmp_path / "anna.driver"
+    ran("driver", "fit", laps / "anna.csv", *names(laps), "--model", "ann", "--set", "restarts=1", "-o", driver)
+    assert "wrote" in ran("driver", "export", driver, "-o", tmp_path / "c")
+    assert {p.suffix for p in (tmp_path / "c").iterdir()} >= {".c", ".h"}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--model", "deep"), "kind 'deep'"), (("--protocol", "mine"), "--protocol mine"), (("--set", "alpha"), "NAME=VALUE"),
+        (("--set", "layers=3"), "no parameter layers"), (("--horizon", "0.15"), "whole number of ticks"),
+        (("-o", "anna.txt"), "ending in .driver"), (("--names", "none.toml"), "does not exist"),
+    ],
+)  # fmt: skip
+def test_misuse_is_said_before_anything_is_written(laps: Path, tmp_path: Path, words, said: str) -> None:
+    fit = ["driver", "fit", str(laps / "anna.csv"), "-o", str(tmp_path / "a.driver"), *map(str, names(laps))]
+    model = () if "--model" in words else ("--model", "ridge")
+    with pytest.raises(CodriverError, match=said):
+        CliRunner().invoke(app, [*fit, *words, *model], catch_exceptions=False)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_drive_without_torque_says_what_to_do(laps: Path, tmp_path: Path) -> None:
+    bare = tmp_path / "bare.csv"
+    bare.write_text("t,longitudinal_speed\n" + "".join(f"{k / 10},10\n" for k in range(300)))
+    with pytest.raises(CodriverError, match="no torque of the driver") as refused:
+        CliRunner().invoke(app, ["driver", "fit", str(bare), "-o", str(tmp_path / "a.driver")], catch_exceptions=False)
+    assert "torque sensor" in refused.value.do
