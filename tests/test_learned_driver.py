@@ -18,7 +18,7 @@ from codriver.drivers.learned.features import features_of
 from codriver.drivers.learned.kinds import BASELINES, KINDS, class_of
 from codriver.drivers.learned.learned_driver import LearnedDriver, fit_driver, fit_table
 from codriver.drivers.learned.prepare import prepared
-from codriver.drivers.learned.protocol import PROTOCOLS, Protocol
+from codriver.drivers.learned.protocol import PROTOCOLS, Protocol, time_blocks
 from codriver.drivers.learned.recognise import recognise
 from codriver.drivers.learned.road_ahead import curvature_ahead
 from codriver.errors import DesignError, FormatError, LogError, MissingSignal, UsageError
@@ -240,3 +240,17 @@ def test_a_torque_is_estimated_where_a_simulator_measures_the_angle_only(tmp_pat
     assert features_of(made).estimated
     with pytest.raises(MissingSignal, match="none can be estimated"):
         prepared(log.without("alignment_torque", "longitudinal_speed"), None)
+
+
+def test_models_work_as_scikit_learns_do() -> None:
+    from sklearn.model_selection import GridSearchCV, cross_validate
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    table = features_of(driven(), SPARSE.features)
+    splits = [(fold.train, fold.test) for fold in time_blocks(table, 4, 5.0, SPARSE.features)]
+    pipeline = make_pipeline(StandardScaler(), class_of("ridge")(alpha=1.0))
+    scores = cross_validate(pipeline, table.X, table.y, cv=splits, scoring="neg_root_mean_squared_error")
+    assert (-scores["test_score"] < table.y.std() / 2).all()
+    search = GridSearchCV(pipeline, {"ridgeregressor__alpha": [1.0, 1e6]}, cv=splits).fit(table.X, table.y)
+    assert search.best_params_ == {"ridgeregressor__alpha": 1.0}
