@@ -14,6 +14,7 @@ C. Bergmeir, J. M. Benitez 2012, doi 10.1016/j.ins.2011.12.028; J. Racine 2000, 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -44,7 +45,7 @@ def block_folds(n: int, folds: int, gap: int, lengths: Sequence[int] | None = No
     if gap < 0:
         raise ValueError(f"gap = {gap} rows; 0 or more")
     edges = np.arange(folds + 1) * n // folds
-    return [_apart(n, [(int(a), int(b))], gap, lengths) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [_apart(n, [(int(a), int(b))], gap, lengths) for a, b in pairwise(edges)]
 
 
 def held_out(n: int, share: float, gap: int, lengths: Sequence[int] | None = None) -> tuple[Rows, Rows]:
