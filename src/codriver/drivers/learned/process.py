@@ -10,13 +10,15 @@ Up to `full_up_to` rows this is the full form (`full_process`): n^3 operations a
 prediction takes n operations for the mean, n^2 for the standard deviation. Longer records take the sparse form (`sparse_process`)
 with m points: n m^2 operations for each step of the search, m for a mean, m^2 for a standard deviation.
 
-The paper's form is `mean="zero", ard=False`. In 29 features no two rows are near each other, and this form spends its one length on
-being almost linear: it is worse than a ridge regression. With `ard` every feature has its own length; with `mean="linear"` the process is
-drawn about a ridge regression and learns what that leaves (the uncertainty of its weights is not in sd).
+The paper's form is `mean="zero", ard=False`. In 29 features no two rows are near each other, and this form spends its one
+length on being almost linear: it is worse than a ridge regression. With `ard` every feature has its own length; with
+`mean="linear"` the process is drawn about a ridge regression and learns what that leaves (the uncertainty of the ridge
+regression's weights is not in sd).
 
 The predictions of a process need all its points: there is no step for the kernel.
 
-Okamoto, Tsiotras 2019, section 2.3. C. E. Rasmussen, C. K. I. Williams 2006, Gaussian Processes for Machine Learning, chapters 2, 5.
+Okamoto, Tsiotras 2019, section 2.3. C. E. Rasmussen, C. K. I. Williams 2006, Gaussian Processes for Machine Learning,
+chapters 2 and 5.
 """
 
 from __future__ import annotations
