@@ -4,7 +4,6 @@ import warnings
 
 import numpy as np
 import pytest
-from learned_data import NOISE, as_grid, as_observer, made, through_json
 from sklearn.base import clone
 from sklearn.ensemble import GradientBoostingRegressor
 from sklearn.linear_model import Ridge, RidgeCV
@@ -23,6 +22,7 @@ from codriver.drivers.learned.process import GaussianProcessTorque
 from codriver.drivers.learned.ridge import ALPHAS, RidgeRegressor
 from codriver.drivers.learned.trees import Trees, greatest_double
 from codriver.errors import DesignError
+from learned_data import NOISE, as_grid, as_observer, made, through_json
 
 MODELS = [
     PiecewiseConstant(), PiecewiseLinear(), RidgeRegressor(), NetworkRegressor(restarts=2), BoostedRidge(trees=30),
@@ -154,7 +154,7 @@ class TestBlocks:
 
     @pytest.mark.parametrize("wrong", [(5, 1, 0), (5, 6, 0), (5, 2, -1)])
     def test_refused(self, wrong):
-        with pytest.raises(ValueError, match="folds|gap"):
+        with pytest.raises(ValueError, match=r"folds|gap"):
             block_folds(*wrong)
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from learned_data import made
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
@@ -10,6 +9,7 @@ from codriver.drivers.learned.exponential_kernel import Sigmas
 from codriver.drivers.learned.full_process import factor, log_likelihood
 from codriver.drivers.learned.process import GaussianProcessTorque
 from codriver.drivers.learned.sparse_process import bound, choose_points, condition
+from learned_data import made
 
 
 def kernel(sigmas, A, B):
