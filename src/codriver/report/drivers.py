@@ -36,6 +36,9 @@ def evaluation_document(
     first = found[0]
     judged = [k for k in first.kinds if k not in BASELINES] or ["ridge"]
     items = dict.fromkeys((f.severity, f.text) for kind in judged for f in first.verdict(kind))
+    items |= dict.fromkeys(
+        ("warn", f"protocol {e.protocol.name} leaks: {t}") for e in found[1:] for t in e.protocol.leaks
+    )
     sections = [Section("Verdict", (Findings(tuple(items)), *([" ".join(f"{n}." for n in notes)] if notes else [])))]
     sections += [Section(f"Protocol {e.protocol.name}", protocol_parts(e)) for e in found]
     if len(found) > 1:
@@ -147,7 +150,7 @@ def _table(e: Evaluation) -> Table:
 
 def _foretold(held: TorquePrediction) -> Chart:
     """Torque foretold and measured over the busiest stretch."""
-    rows = _busiest(held.time, held.measured)
+    rows = _busiest(held)
     time = held.time[rows] + held.horizon - held.time[rows[0]]
     return Chart(
         f"The torque and what was foretold {held.horizon:g} s before", "time from the start of the stretch (s)",
@@ -192,8 +195,10 @@ def _features(driver: LearnedDriver) -> Table:
     return Table(("signal", "as", "s from now"), rows)
 
 
-def _busiest(time: Array, torque: Array) -> Index:
+def _busiest(held: TorquePrediction) -> Index:
     """Rows of the stretch of SHOWN s in which the torque varies most; drives have clocks of their own."""
-    found = [np.flatnonzero((time >= s) & (time < s + SHOWN)) for s in time[:: max(time.size // 200, 1)]]
+    starts = range(0, held.time.size, max(held.time.size // 200, 1))
+    time, drive = held.time, held.drive
+    found = [np.flatnonzero((drive == drive[k]) & (time >= time[k]) & (time < time[k] + SHOWN)) for k in starts]
     full = [rows for rows in found if rows.size >= 0.8 * max(r.size for r in found)]
-    return max(full, key=lambda rows: float(np.std(torque[rows])))
+    return max(full, key=lambda rows: float(np.std(held.measured[rows])))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from codriver.drivers.learned.calibration import Calibration
-from codriver.drivers.learned.features import Feature, FeatureTable, features_of
+from codriver.drivers.learned.features import Feature, FeatureTable, Index, features_of
 from codriver.drivers.learned.kinds import DEFAULT, regressor_of
 from codriver.drivers.learned.protocol import Fold, Protocol, time_blocks
 from codriver.drivers.learned.regressor import TorqueRegressor
@@ -33,6 +33,7 @@ class TorquePrediction:
 
     Attributes:
         time: of each row's now, s, shape (n,).
+        drive: number of the drive each row is of, shape (n,).
         horizon: the torque is that of time + horizon, s.
         mean, sd: N m, shape (n,).
         low, high: 95 % band, N m, shape (n,).
@@ -42,6 +43,7 @@ class TorquePrediction:
     """
 
     time: Array
+    drive: Index
     horizon: float
     mean: Array
     sd: Array
@@ -125,7 +127,7 @@ def _foretold(
     """A prediction with its band, in the order of time."""
     half = calibration.half_width(own_sd)
     made = TorquePrediction(
-        table.time, horizon, mean, calibration.sd(own_sd), mean - half, mean + half, table.y,
+        table.time, table.drive, horizon, mean, calibration.sd(own_sd), mean - half, mean + half, table.y,
         table.X[:, table.torque_columns[0]], calibration.log_density(table.y - mean, own_sd),
     )  # fmt: skip
     order = np.lexsort((table.time, table.drive))
