@@ -67,7 +67,9 @@ def evaluation_told(
             for f in dict.fromkeys(f for kind in judged or ["ridge"] for f in first.verdict(kind))
         ]
         + [
-            {"severity": "warn", "text": f"protocol {e.protocol.name} leaks: {leak}"} for e in found[1:] for leak in e.protocol.leaks
+            {"severity": "warn", "text": f"protocol {e.protocol.name} leaks: {leak}"}
+            for e in found[1:]
+            for leak in e.protocol.leaks
         ],
         "report": str(report) if report is not None else None,
     }  # fmt: skip

@@ -12,7 +12,6 @@ from codriver.drivers.learned.kinds import BASELINES
 from codriver.drivers.learned.learned_driver import LearnedDriver, TorquePrediction
 from codriver.report.document import BLACK, GREY, Chart, Curve, Document, Findings, Mark, Part, Plot, Section, Table
 from codriver.signals import Log
-from codriver.signals.signal import Array
 
 FULL = {
     "pwc": "the torque stays (3)", "pwl": "its slope stays (4)", "ridge": "ridge", "ann": "neural net (26)",
