@@ -47,6 +47,7 @@ class GaussianProcessTorque(TorqueRegressor):
         ard: a length for each feature; False: one for all (the paper's).
         full_up_to: rows up to which the full form is used.
         inducing: m, points of the sparse form.
+        searched: rows, evenly spread, on which the sparse form searches its parameters; all rows then make the prediction.
         random_state: of the points' choice; a number gives the same ones every time.
     """
 
@@ -59,10 +60,11 @@ class GaussianProcessTorque(TorqueRegressor):
         ard: bool = True,
         full_up_to: int = 1000,
         inducing: int = 300,
+        searched: int = 3000,
         random_state: Any = 0,
     ) -> None:
         self.mean, self.ard, self.full_up_to, self.inducing = mean, ard, full_up_to, inducing
-        self.random_state = random_state
+        self.searched, self.random_state = searched, random_state
 
     def fit(self, X: Array, y: Array, lengths: Sequence[int] | None = None) -> Self:
         """Learn.
@@ -77,8 +79,10 @@ class GaussianProcessTorque(TorqueRegressor):
         """
         from sklearn.utils import check_random_state
 
-        if self.mean not in ("linear", "zero") or self.inducing < 1:
-            raise ValueError(f"mean = {self.mean!r}, inducing = {self.inducing}; 'linear' or 'zero', 1 or more")
+        if self.mean not in ("linear", "zero") or self.inducing < 1 or self.searched < 1:
+            raise ValueError(
+                f"mean = {self.mean!r}, inducing = {self.inducing}, searched = {self.searched}; 'linear' or 'zero', 1 or more"
+            )
         X, y = training_rows(self, X, y, lengths)
         self.ridge_ = RidgeRegressor().fit(X, y, lengths) if self.mean == "linear" else None
         if self.ridge_ is not None:
@@ -92,7 +96,9 @@ class GaussianProcessTorque(TorqueRegressor):
             self._take(X, sigmas, np.asarray(cho_solve((L, True), y)), L, None)
         else:
             points = sparse_process.choose_points(X, self.inducing, check_random_state(self.random_state))
-            best = greatest(lambda theta: sparse_process.bound(theta, points, X, unit), X.shape[1], self.ard)
+            every = -(-y.size // self.searched)
+            some, known = X[::every], unit[::every]
+            best = greatest(lambda theta: sparse_process.bound(theta, points, some, known), X.shape[1], self.ard)
             sigmas = best.times(scale)
             self._take(points, sigmas, *sparse_process.condition(sigmas, points, X, y))
         return self
