@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -375,11 +374,6 @@ class TestBrakeOnTheRoadTest:
         for found in fit.coefficients.values():
             assert 0.6 < found.sd_hac / found.sd < 1.7
             assert found.low < found.value < found.high
-
-    def test_time(self, road, car):
-        begun = time.perf_counter()
-        identify_brake(road, car)
-        assert time.perf_counter() - begun < 3.0
 
     def test_vehicle_needs_no_brake_before(self, road, car):
         bare = cd.Vehicle("bare", "", "", {name: car.parameters[name] for name in ("mass", "transmission")})
@@ -873,13 +867,6 @@ class TestVehicleAgainstLog:
         assert check_vehicle_against_log(demo.measured.between(0, 2), car) == ()
         short = demo.measured.without("engine_torque", "accelerator_pedal")
         assert check_vehicle_against_log(short, car) == ()
-
-    def test_time(self, road, car):
-        part = road.between(0, 600)
-        check_vehicle_against_log(part, car)
-        begun = time.perf_counter()
-        check_vehicle_against_log(part, car)
-        assert time.perf_counter() - begun < 0.3
 
 
 class TestReport:

@@ -528,17 +528,11 @@ def test_scikit_learn(estimator, check):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", BOTH)
 def test_a_drive_of_fifteen_minutes(kind):
-    """Twenty-one components of thirty features learn in less than a minute; so do some stretches with a duplicate feature."""
-    from time import perf_counter
-
+    """Twenty-one components of thirty features, one twice, from three stretches; 1e5 rows are finite (speed: benchmarks/)."""
     X, y = switching(4500, d=30)
     X[:, 29] = X[:, 28]
-    began = perf_counter()
     made = kind(components=21).fit(X, y, [1500, 3000])
-    assert perf_counter() - began < 60
     rows = np.tile(X, (23, 1))[:100_000]
-    began = perf_counter()
     mean, sd = made.predict(rows, return_std=True)
-    assert perf_counter() - began < 5  # a second on a machine that does nothing else
     assert np.isfinite(mean).all()
     assert np.isfinite(sd).all()

@@ -75,7 +75,7 @@ def parse_vehicle(text: str, where: str) -> Vehicle:
     if faults:
         raise VehicleError(
             f"{where}: " + "; ".join(faults),
-            f"tables named {', '.join(KNOWN)}, each with value, unit and source (sd if known)",
+            "tables named as in the list of docs/vehicles.md, each with value, unit and source (sd if known)",
             "mend the file; `codriver check vehicle FILE` shows whether all is well",
         )
     return Vehicle(tables["name"], tables["title"], tables["source"], parameters)

@@ -95,8 +95,8 @@ class Vehicle:
             near = nearest(name, KNOWN)
             raise VehicleError(
                 f"'{name}' is not a parameter",
-                f"one of {', '.join(KNOWN)}" + (f"; did you mean {near}?" if near else ""),
-                "see docs/vehicles.md for the list",
+                "a parameter of the list in docs/vehicles.md",
+                f"did you mean {near}?" if near else "see docs/vehicles.md for the list",
             )
         new = Parameter(name, _numbers(value), KNOWN[name].unit, None if sd is None else _numbers(sd), source)
         return Vehicle(self.name, self.title, self.source, {**self.parameters, name: new})
