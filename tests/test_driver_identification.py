@@ -9,6 +9,7 @@ import pytest
 
 import codriver as cd
 from codriver.errors import LogError, MissingSignal, UsageError
+from codriver.identify.driver_dual_ekf import DualTuning, _advance, dual_ekf
 from codriver.identify.driver_fit import ASKED, identify_driver
 from codriver.identify.driver_record import driver_record
 from codriver.identify.driver_residual import whitened, whitening
@@ -221,6 +222,39 @@ class TestParts:
         assert np.corrcoef(record.near[rows] - made.near[rows], own)[0, 1] > 0.8
         assert abs(np.corrcoef(made.near[rows], own)[0, 1]) < 0.1
         assert np.corrcoef(made.near[rows], still.near[rows])[0, 1] > 0.98
+
+
+class TestDualFilter:
+    def test_model(self, clean):
+        # The filter's model over a drive, against the driver's torque with an exact delay.
+        import casadi as ca
+
+        truth = CIRCUIT_DRIVERS["carla"]
+        record = driver_record(clean, truth.near, truth.far)
+        x, u = ca.SX.sym("x", 4), ca.SX.sym("u", 3)
+        after = _advance(truth, (), x, ca.SX(0, 1), u, record.speed, record.dt)
+        run = ca.Function("f", [x, u], [after, after[3]]).mapaccum("run", record.torque.size, 1, {"base": 16})
+        torque = np.array(run(np.zeros(4), np.stack([record.near, record.far, record.angle]))[1]).ravel()
+        exact = truth.torque(record.near, record.far, record.angle, record.speed, record.dt)
+        assert np.std(torque - exact) < 0.05 * np.std(exact)
+
+    def test_recurrence(self, clean):
+        # Remark 4 holds without the recurrence only.
+        truth = CIRCUIT_DRIVERS["carla"]
+        record = driver_record(clean, truth.near, truth.far)
+        names = ("anticipation", "compensation", "delay")
+        known = replace(truth, anticipation=4.6, compensation=9.0, delay=0.12)
+        ends = {r: dual_ekf(record, known, names, recurrent=r).last() for r in (True, False)}
+        assert ends[True]["anticipation"][0] == pytest.approx(truth.anticipation, rel=0.02)
+        assert ends[True]["compensation"][0] == pytest.approx(truth.compensation, rel=0.15)
+        off = {r: abs(np.log(end["anticipation"][0] / truth.anticipation)) for r, end in ends.items()}
+        assert off[False] > 5 * off[True]
+
+    def test_without_evidence(self, clean):
+        record = driver_record(clean, 6.0, 1.3)
+        fit = dual_ekf(record, TwoPointDriver(), ("delay",), DualTuning(doubt=1e6, wander=0.0))
+        assert fit.last()["delay"] == pytest.approx((0.12, 0.12 * 0.3), rel=1e-3)
+        assert fit.values.shape == (fit.time.size, 1)
 
 
 class TestMultiBody:
