@@ -6,6 +6,8 @@ from codriver.identify.alignment_stiffness import StiffnessFit, identify_alignme
 from codriver.identify.brake import identify_brake
 from codriver.identify.brake_fit import BrakeFit, Coefficient, Refusal
 from codriver.identify.check_log import check_vehicle_against_log
+from codriver.identify.driver_fit import identify_driver
+from codriver.identify.driver_result import DriverFit, DriverParameter
 from codriver.identify.learning import LearningPoint
 from codriver.identify.pedal import PedalFit, identify_pedal
 from codriver.identify.ratio import GearRatio, RatioFit, identify_ratio
@@ -19,6 +21,8 @@ __all__ = [
     "AlignmentFit",
     "BrakeFit",
     "Coefficient",
+    "DriverFit",
+    "DriverParameter",
     "GearRatio",
     "LearningPoint",
     "PedalFit",
@@ -34,6 +38,7 @@ __all__ = [
     "identify_alignment",
     "identify_alignment_stiffness",
     "identify_brake",
+    "identify_driver",
     "identify_pedal",
     "identify_ratio",
     "identify_steering_wheel",

@@ -191,7 +191,7 @@ def _drive(s: CircuitSetting, path: PathAhead, n: int, varied: Variation) -> Arr
     state = tick.start()
     share, floor = (noise.motor, noise.floor) if noise is not None else (0.0, 0.0)
     kept = np.zeros((n, 10))
-    delta = omega = beta = r = psi = y = 0.0
+    delta = omega = beta = r = psi = y = trembled = 0.0
     for k, (more_far, more_near, near_noise, far_noise, motor) in enumerate(zip(*columns, strict=True)):
         near, far = near_bend[k] - y / driver.near - psi, far_bend[k] - y / ahead - psi
         if gains is None:
@@ -200,7 +200,8 @@ def _drive(s: CircuitSetting, path: PathAhead, n: int, varied: Variation) -> Arr
             # The plan reckons with the car as it is, on a course that is seen as well or badly as the far point.
             state_part = gains[0] * beta + gains[1] * r + gains[2] * (psi - far_noise) + gains[3] * y
             wanted = ratio * (planned[k] + state_part)
-        trembled = motor * (share * abs(state.pull) + floor)
+        # Of what the muscles are told, without the noise that they had a tick ago: else noise would be gain.
+        trembled = motor * (share * abs(state.pull - trembled) + floor)
         state, torque = tick.advance(state, near + near_noise, more_far * wanted, delta, more_near, trembled)
         aligned = back * (beta + lever * r - delta / ratio)
         kept[k] = delta, omega, torque, aligned, beta, r, y, psi, near, far

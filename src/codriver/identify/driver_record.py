@@ -1,0 +1,137 @@
+"""A drive as the two-point driver lived it: what he saw, the wheel in his hands, and his torque, on ticks at one speed.
+
+    theta_near, theta_far       of `models.road_sight`, from curvature, offset and heading error along the drive
+    delta_s, T_dr               wheel angle, rad, and the driver's torque, N m
+
+The curvature ahead is that which the log holds later, so the last seconds are not used. Offset and heading error are the log's, or,
+where it lacks them, sums of yaw rate, sideslip, curvature and speed. Those drift, so then everything goes through a high-pass of
+third order at SLOW Hz, which changes nothing in a linear model whose parameters are constant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from codriver.errors import LogError, MissingSignal
+from codriver.models.road_sight import PathAhead, path_errors
+from codriver.signals import Log
+from codriver.signals.signal import Array
+
+NEEDED = ("steering_wheel_angle", "driver_torque", "longitudinal_speed", "road_curvature")
+WHERE = ("lateral_offset", "heading_error")
+MOTION = ("sideslip_angle", "yaw_rate")
+SETTLED = 10.0  # s from the start that are not used: the model starts from rest
+PREVIEW = 2.4  # s to the end that are not used: the road ahead is seen so far
+SLOW = 0.02  # Hz
+LEAST_SECONDS = 60.0
+SLOWEST_RATE, FASTEST_RATE = 20.0, 200.0  # Hz
+LONGEST_HOLE = 0.5  # s
+LEAST_SPEED = 3.0  # m/s
+MOST_SPREAD = 0.05  # of the speed
+
+
+@dataclass(frozen=True, eq=False)
+class DriverRecord:
+    """A drive on ticks; columns of shape (n,).
+
+    Attributes:
+        near, far, angle: theta_near, theta_far, delta_s, rad.
+        torque: T_dr, N m; curvature: rho, 1/m.
+        speed: mean, m/s.
+        dt: s.
+        first, last: rows that count.
+        summed: offset and heading error are sums, and everything went through the high-pass.
+        source: of the log.
+    """
+
+    near: Array = field(repr=False)
+    far: Array = field(repr=False)
+    angle: Array = field(repr=False)
+    torque: Array = field(repr=False)
+    curvature: Array = field(repr=False)
+    speed: float
+    dt: float
+    first: int
+    last: int
+    summed: bool
+    source: str
+
+
+def driver_record(log: Log, near: float, far: float) -> DriverRecord:
+    """Take a drive.
+
+    Args:
+        log: with wheel angle, driver's torque, speed and curvature, and offset and heading error or sideslip and yaw rate.
+        near: distance of the near point, m.
+        far: the far point is where the car will be after so many s.
+
+    Raises:
+        MissingSignal: the log lacks one of them.
+        LogError: the drive is too short, has holes, stands, or its speed varies.
+    """
+    name = log.source or "this log"
+    summed = not all(n in log for n in WHERE)
+    used = NEEDED + (MOTION if summed else WHERE)
+    lacking = [n for n in used if n not in log]
+    if lacking:
+        raise MissingSignal(
+            f"{name} lacks {', '.join(lacking)}",
+            f"{', '.join(NEEDED)}, and {' and '.join(WHERE)} or {' and '.join(MOTION)}",
+            "map them in a names file; estimate driver_torque and sideslip_angle where no sensor has them",
+        )
+    time, dt = _ticks(log, used, name)
+    values = {n: np.interp(time, log[n].time, log[n].values) for n in used}
+    v = values["longitudinal_speed"]
+    speed = float(v.mean())
+    if v.min() < LEAST_SPEED or v.std() > MOST_SPREAD * speed:
+        raise LogError(
+            f"{name}: a speed of {v.min():.1f} to {v.max():.1f} m/s, {v.std():.2f} m/s of spread",
+            f"at least {LEAST_SPEED:g} m/s, with a spread of {100 * MOST_SPREAD:g} % at most: the model is one for each speed",
+            "cut the log to a stretch at one speed",
+        )
+    place = np.concatenate([[0.0], np.cumsum(dt * (v[1:] + v[:-1]) / 2)])
+    rho = values["road_curvature"]
+    path = PathAhead.of(place, rho)
+    if summed:
+        y, psi = path_errors(time, v, rho, values["sideslip_angle"], values["yaw_rate"])
+    else:
+        y, psi = values["lateral_offset"], values["heading_error"]
+    ahead = far * speed
+    seen = (
+        path.bend(place, near) - y / near - psi, path.bend(place, ahead) - y / ahead - psi,
+        values["steering_wheel_angle"], values["driver_torque"], rho,
+    )  # fmt: skip
+    near_angle, far_angle, angle, torque, bent = seen
+    if summed:
+        from scipy.signal import butter, sosfilt
+
+        sections = butter(3, SLOW, "highpass", fs=1 / dt, output="sos")
+        near_angle, far_angle, angle, torque, bent = (np.asarray(sosfilt(sections, x), float) for x in seen)
+    first = round((SETTLED + (0.5 / SLOW if summed else 0.0)) / dt)
+    last = int(np.searchsorted(place, place[-1] - max(near, ahead, PREVIEW * speed)))
+    return DriverRecord(near_angle, far_angle, angle, torque, bent, speed, dt, first, last, summed, name)
+
+
+def _ticks(log: Log, used: tuple[str, ...], name: str) -> tuple[Array, float]:
+    """Ticks of the torque's rate over the stretch that all signals cover."""
+    from itertools import starmap
+
+    torque = log["driver_torque"]
+    rate = min(torque.rate, FASTEST_RATE)
+    start, end = max(log[n].time[0] for n in used), min(log[n].time[-1] for n in used)
+    if end - start < LEAST_SECONDS or rate < SLOWEST_RATE:
+        raise LogError(
+            f"{name}: {max(end - start, 0):.0f} s of all signals, torque at {rate:.3g} Hz",
+            f"at least {LEAST_SECONDS:g} s at {SLOWEST_RATE:g} Hz: a driver's delay is 0.1 s",
+            "record a longer drive, and faster",
+        )
+    holes = {n: float(np.diff(log[n].time).max()) for n in used}
+    if max(holes.values()) > LONGEST_HOLE:
+        said = ", ".join(starmap("{} {:.1f} s".format, [h for h in holes.items() if h[1] > LONGEST_HOLE]))
+        raise LogError(
+            f"{name}: holes in {said}", f"none above {LONGEST_HOLE:g} s", "cut the log to a stretch without them"
+        )
+    dt = round(1 / rate, 4)
+    return start + dt * np.arange(int((end - start) / dt) + 1, dtype=np.float64), dt
