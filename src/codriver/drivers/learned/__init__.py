@@ -5,6 +5,7 @@ regressor, kinds                                             what a model is; th
 protocol, evaluate                                           what is held out; tables with the baselines in them
 calibration                                                  bands that hold what they promise
 learned_driver, driver_file                                  a driver as a value, and as a file
+horizon, rollout                                             error against horizon, direct or iterated through a vehicle
 recognise                                                    which of several drivers is this?
 driver_observer                                              a driver as an Observer: batch, live, C
 """
@@ -14,6 +15,7 @@ from codriver.drivers.learned.driver_observer import observer_of
 from codriver.drivers.learned.evaluate import Evaluation, Score, evaluate, evaluate_table
 from codriver.drivers.learned.feature_setting import FeatureSetting
 from codriver.drivers.learned.features import FeatureTable, features_of
+from codriver.drivers.learned.horizon import HorizonErrors, error_against_horizon
 from codriver.drivers.learned.kinds import BASELINES, DEFAULT, KINDS, class_of, regressor_of
 from codriver.drivers.learned.learned_driver import LearnedDriver, TorquePrediction, fit_driver, fit_table
 from codriver.drivers.learned.prepare import prepared
@@ -29,6 +31,7 @@ __all__ = [
     "Evaluation",
     "FeatureSetting",
     "FeatureTable",
+    "HorizonErrors",
     "LearnedDriver",
     "Likeness",
     "Protocol",
@@ -36,6 +39,7 @@ __all__ = [
     "TorquePrediction",
     "TorqueRegressor",
     "class_of",
+    "error_against_horizon",
     "evaluate",
     "evaluate_table",
     "features_of",
