@@ -14,6 +14,7 @@ Its parameters are its own: an estimator never shares them, and may be wrong abo
     road_test               42 minutes, and two laps, of all this
     folder, drive_files     files, written whole or not at all
     steering                a steering wheel that its motor turns
+    motorcycle              a nonlinear motorcycle, its rider and sensors
 """
 
 from codriver.simulate.bus import BusParameters, Hole, drop_outs
