@@ -10,7 +10,8 @@ import typer
 
 def reproduce(
     papers: Annotated[
-        list[str], typer.Argument(metavar="PAPER...", help="jerk2017, jerk2015, steering2019.", show_default=False)
+        list[str],
+        typer.Argument(metavar="PAPER...", help="jerk2017, jerk2015, steering2019, drivers2019.", show_default=False),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.")] = Path(),
     recordings: Annotated[
