@@ -23,7 +23,7 @@ def reproduce(
 ) -> None:
     """Make a paper's tables, figures and claims again; DIR/PAPER.html is to be read, DIR/PAPER.json to be processed.
 
-    Example: codriver reproduce jerk2017 jerk2015 steering2019 -o papers
+    Example: codriver reproduce jerk2017 jerk2015 steering2019 drivers2019 -o papers
     """
     from codriver.papers import PAPERS
     from codriver.papers import reproduce as make

@@ -12,7 +12,7 @@ from codriver.report.document import Chart, Curve, Mark, Plot, Table
 # A hue a method; those beside the paper are greys and browns.
 _COLORS = {
     "pwc": "#333333", "pwl": "#8C8C8C", "gp": "#0072B2", "gmr-21": "#E69F00", "hmm-21": "#C84C00", "ann": "#007A5A",
-    "ridge": "#8E2F86", "gmr-bic": "#B8860B", "boosting": "#2AA9B8", "guarded": "#C08497",
+    "ridge": "#8E2F86", "ann-decay": "#7FBFA0", "gmr-bic": "#B8860B", "boosting": "#2AA9B8", "guarded": "#C08497",
 }  # fmt: skip
 
 
@@ -45,7 +45,7 @@ def means(title: str, found: Judged) -> Chart:
     )
     return Chart(
         f"{title}, over all: {found.protocol.name}", "", (Plot("RMSE (N m)", (bars,), 240, (found.mean("pwc"),)),),
-        "Whiskers: standard deviation over drives and sub-data sets. Dotted: PWC.", half=True,
+        "Whiskers: standard deviation over drives and sub-data sets. Dotted: PWC.",
     )  # fmt: skip
 
 
