@@ -21,6 +21,7 @@ PAPERS: dict[str, tuple[str, str]] = {
         "codriver.papers.steering2019",
         "Okamoto, Tsiotras 2019, Robotics and Autonomous Systems",
     ),
+    "drivers2019": ("codriver.papers.drivers2019", "Okamoto, Tsiotras 2019, Robotics and Autonomous Systems"),
     "jerk2015": ("codriver.papers.jerk2015", "Bisoffi, Biral, Da Lio, Zaccarian 2015, doi:10.1109/ITSC.2015.301"),
 }
 
