@@ -14,7 +14,7 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 import codriver as cd
-from codriver.drivers.learned.blocks import block_folds, gap_that_fits, held_out
+from codriver.drivers.learned.blocks import block_folds
 from codriver.drivers.learned.boosting import BoostedRidge
 from codriver.drivers.learned.naive import PiecewiseConstant, PiecewiseLinear
 from codriver.drivers.learned.network import NetworkRegressor, output, output_and_jacobian
@@ -36,8 +36,17 @@ def called(model):
     return model.kind + sparse
 
 
-@parametrize_with_checks(MODELS)
+QUICK = ("pwc", "pwl", "ridge", "ann")
+
+
+@parametrize_with_checks([model for model in MODELS if model.kind in QUICK])
 def test_scikit_learn(estimator, check):
+    check(estimator)
+
+
+@pytest.mark.slow
+@parametrize_with_checks([model for model in MODELS if model.kind not in QUICK])
+def test_scikit_learn_slow(estimator, check):
     check(estimator)
 
 
@@ -99,7 +108,8 @@ def test_no_step_of_a_process():
 @pytest.mark.parametrize(
     ("model", "bend"),
     [
-        (RidgeRegressor(), 0.0), (NetworkRegressor(), 1.0), (BoostedRidge(), 1.0), (GaussianProcessTorque(), 1.0),
+        (RidgeRegressor(), 0.0), (NetworkRegressor(), 1.0), (BoostedRidge(), 1.0),
+        pytest.param(GaussianProcessTorque(full_up_to=600), 1.0, marks=pytest.mark.slow),
         (GaussianProcessTorque(full_up_to=0, inducing=100), 1.0),
     ],
     ids=["ridge", "ann", "boosting", "gp", "gp-sparse"],
@@ -120,42 +130,6 @@ def test_sd_grows_away_from_the_data(model):
     fitted = clone(model).fit(X, y)
     near, far = fitted.predict(np.vstack([X.mean(axis=0), np.full(X.shape[1], 30.0)]), return_std=True)[1]
     assert far > 1.2 * near
-
-
-class TestBlocks:
-    @pytest.mark.parametrize("lengths", [None, [30, 1, 0, 26], [7] * 8 + [1]])
-    @pytest.mark.parametrize(("folds", "gap"), [(2, 0), (5, 3), (57, 1), (4, 40)])
-    def test_by_brute_force(self, folds, gap, lengths):
-        n = 57
-        stretch = np.zeros(n, dtype=int) if lengths is None else np.repeat(np.arange(len(lengths)), lengths)
-        found = block_folds(n, folds, gap, lengths)
-        assert np.array_equal(np.concatenate([test for _, test in found]), np.arange(n))
-        assert {test.size for _, test in found} <= {n // folds, n // folds + 1}
-        for train, test in found:
-            wanted = [
-                k for k in range(n)
-                if k not in test and all(abs(k - t) > gap or stretch[k] != stretch[t] for t in test)
-            ]  # fmt: skip
-            assert train.tolist() == wanted
-
-    def test_a_share_is_spread(self):
-        train, test = held_out(1000, 0.2, 10)
-        assert test.size == 200
-        edges = np.flatnonzero(np.diff(test) > 1)
-        assert edges.tolist() == [49, 99, 149]
-        assert train.size == 1000 - 200 - 4 * 20
-        assert np.min(np.abs(train[:, np.newaxis] - test)) == 11
-
-    @pytest.mark.parametrize("n", range(2, 12))
-    def test_a_share_of_few_rows(self, n):
-        train, test = held_out(n, 0.2, gap_that_fits(n, 10))
-        assert np.array_equal(np.sort([*train, *test]), np.arange(n))
-        assert 1 <= test.size < n
-
-    @pytest.mark.parametrize("wrong", [(5, 1, 0), (5, 6, 0), (5, 2, -1)])
-    def test_refused(self, wrong):
-        with pytest.raises(ValueError, match=r"folds|gap"):
-            block_folds(*wrong)
 
 
 class TestNaive:

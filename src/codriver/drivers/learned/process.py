@@ -10,6 +10,11 @@ Up to `full_up_to` rows this is the full form (`full_process`): n^3 operations a
 prediction takes n operations for the mean, n^2 for the standard deviation. Longer records take the sparse form (`sparse_process`)
 with m points: n m^2 operations for each step of the search, m for a mean, m^2 for a standard deviation.
 
+A torque some steps ahead has errors that resemble their neighbours', which this model of independent noise does not know. The full
+form then takes them for signal: on 1000 rows of a simulated driver, 1 s ahead, sigma_n went to zero, the error was 1.16 of the
+ridge regression's and 82 % were within the 95 % band; the sparse form of the same rows had 1.02 and 92 %. Where errors were
+independent the full form won by 1.5 %. So only short records take it.
+
 The paper's form is `mean="zero", ard=False`. In 29 features no two rows are near each other, and this form spends its one
 length on being almost linear: it is worse than a ridge regression. With `ard` every feature has its own length; with
 `mean="linear"` the process is drawn about a ridge regression and learns what that leaves (the uncertainty of the ridge
@@ -58,7 +63,7 @@ class GaussianProcessTorque(TorqueRegressor):
         self,
         mean: str = "linear",
         ard: bool = True,
-        full_up_to: int = 1000,
+        full_up_to: int = 500,
         inducing: int = 300,
         searched: int = 3000,
         random_state: Any = 0,
