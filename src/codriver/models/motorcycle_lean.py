@@ -80,6 +80,12 @@ class LeanParameters:
             own["pneumatic_trail"], own["drag"], (own["imu_forward"], own["imu_left"], own["imu_height"]),
         )  # fmt: skip
 
+    @property
+    def height(self) -> float:
+        """Of the whole machine's mass centre, m."""
+        q = self.sharp
+        return (q.Mf * ((q.a + q.e) * sin(q.eps) + q.f * cos(q.eps)) + q.Mr * q.h) / q.mass
+
     def crown(self, X: float) -> float:
         """rho at X ahead of the road point, m."""
         p = self.sharp
@@ -147,7 +153,7 @@ def _equations(
     D = p.drag * v * v
     F = q.mass * dv + D  # along the road, from the tyres
     drives, brakes = select(F > 0, F, 0.0), select(F > 0, 0.0, F)
-    shift = F * C * _height(q) / (q.front + q.b)
+    shift = F * C * p.height / (q.front + q.b)
     N_f = select(shift > 0.8 * q.load, 0.2 * q.load, q.load - shift)
     rear_load = q.mass * q.g - q.load
     front_share, rear_share = N_f / q.load, (rear_load + q.load - N_f) / rear_load
@@ -168,11 +174,6 @@ def _equations(
         (-q.Cr1 * w_r - u * (q.Cr2 * rear_share * phi + Y_r)) / q.sr,
     )
     return mass, ca.substitute(ca.substitute(force, spin, v), load, N_f), tyres
-
-
-def _height(q: MotorcycleParameters) -> float:
-    """Of the whole machine's mass centre, m."""
-    return (q.Mf * ((q.a + q.e) * sin(q.eps) + q.f * cos(q.eps)) + q.Mr * q.h) / q.mass
 
 
 def _energies(
