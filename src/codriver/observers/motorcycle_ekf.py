@@ -39,7 +39,7 @@ from codriver.kernel import Scalar, both, negate, select, sqrt
 from codriver.models.motorcycle_lean import LEAN_STATES, LeanParameters, lean_functions
 from codriver.names import quantity
 from codriver.observers.augmented_kalman import Moments, carried, pack, unpack
-from codriver.observers.covariance import update_row
+from codriver.observers.covariance import Matrix, update_row
 from codriver.observers.observer import Observer, Output, Scalars
 from codriver.observers.sample_scatter import learn_scatter, scatter_carry
 from codriver.observers.scaled_gain import check_tick
@@ -69,8 +69,8 @@ STEEPEST, SURE = 1.35, 3 * DEGREE
 CLOSE, TERMS = 1e-3, 12
 # What states cannot exceed, so that nonsense stays finite; standard deviations at the start. Units of STATES.
 BOUNDS = (STEEPEST + 0.1, 1.0, 20.0, 6.0, 10.0, 30.0, 2e4, 2e4, 1e3, 5e3, 3.0, 1.0, 1.0, 1.0, 5.0, 5.0)
-START = (0.15, 0.05, 0.5, 0.2, 0.3, 0.5, 300.0, 300.0, 30.0, 50.0, 0.05, 0.02, 0.02, 0.02, 0.3, 0.3)
-SCATTER = dict(zip(IMU, (0.01, 0.01, 0.01, 0.2, 0.2), strict=True))  # rad/s, m/s^2, until learnt
+START = (0.15, 0.05, 0.5, 0.2, 0.3, 0.5, 300.0, 300.0, 30.0, 50.0, 0.05, 0.01, 0.01, 0.01, 0.25, 0.25)
+SCATTER = dict(zip(IMU, (0.05, 0.05, 0.05, 1.0, 1.0), strict=True))  # rad/s, m/s^2, until learnt
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,8 @@ def motorcycle_ekf(
         moved, P = x + series(whole, rate, dt, terms), F @ P @ F.T + ca.diag(spread)
         start = _start(p, y, ok, v)
         found = [select(begun, moved[i], start[i]) for i in range(N)]
-        apart = [[0.0 if i != j else START[i] ** 2 for j in range(N)] for i in range(N)]
+        apart: Matrix = [[0.0 if i != j else START[i] ** 2 for j in range(N)] for i in range(N)]
+        apart[MOMENT][MOMENT] += slowness * noise.feet**2
         covariance = [[select(begun, P[min(i, j), max(i, j)], apart[i][j]) for j in range(N)] for i in range(N)]
 
         # What the rows should show; the accelerations' derivatives are those at the last estimate.
