@@ -88,19 +88,19 @@ class EkfNoise:
     """
 
     lateral: float = 0.05
-    yaw: float = 0.05
-    roll: float = 0.05
-    steer: float = 1.0
+    yaw: float = 0.06
+    roll: float = 0.06
+    steer: float = 0.4
     tyre: float = 400.0
-    torque: float = 60.0
-    moment: float = 10.0
+    torque: float = 25.0
+    moment: float = 8.0
     feet: float = 600.0
     pitch: float = 0.03
     gyro_walk: float = 1e-4
     accelerometer_walk: float = 1e-3
-    gyro: float = 0.005
-    lateral_force: float = 0.1
-    vertical_force: float = 0.4
+    gyro: float = 0.003
+    lateral_force: float = 0.05
+    vertical_force: float = 0.3
     encoder: float = 0.0005
 
     def process(self) -> Array:
