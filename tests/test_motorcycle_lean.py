@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rides import leaning_ride, machine, vehicle
 
 import codriver as cd
 from codriver.models import MotorcycleParameters, motorcycle_model
 from codriver.models.motorcycle_lean import USUAL, LeanParameters, lean_functions
+from rides import leaning_ride, machine, vehicle
 
 BARE = {"front_crown": 0.0, "rear_crown": 0.0, "pneumatic_trail": 0.0, "drag": 0.0}
 

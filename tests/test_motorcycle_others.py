@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rides import DEGREE, errors, lane_change_ride, leaning_ride, noisy, ride_log, rms, slalom_ride, vehicle
 from scipy.linalg import expm
 
 import codriver as cd
@@ -18,6 +17,7 @@ from codriver.observers.motorcycle_uio import design_motorcycle_uio, motorcycle_
 from codriver.observers.series import series, terms_needed
 from codriver.observers.speed_tracker import CARRY, track_speed
 from codriver.testing import check_observer
+from rides import DEGREE, errors, lane_change_ride, leaning_ride, noisy, ride_log, rms, slalom_ride, vehicle
 
 LOW, HIGH, DT = 8.0, 40.0, 0.005
 ALL = ("motorcycle-ekf", "motorcycle-kalman", "motorcycle-ts", "motorcycle-uio", "motorcycle-imu")

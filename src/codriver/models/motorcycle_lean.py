@@ -5,8 +5,8 @@
     d/dt dT/dphi' - d(T - V)/dphi = Q_phi,   d/dt dT/ddelta' - d(T - V)/ddelta = Q_delta + tau
     sigma Y' = -C_1 (w - v Delta) - u C_2 lambda - u Y                  each tyre
 
-Lagrange's equations in the velocities v, v_y of the road point and the yaw rate W, both about the road (`STATES` of `motorcycle`, ISO
-8855). A point X ahead and Z up in the plane of the machine, n to its left, is at
+Lagrange's equations in the velocities v, v_y of the road point and the yaw rate W about the road's normal, ISO 8855 (`STATES` of
+`motorcycle`). A point X ahead and Z up in the plane of the machine, n to its left, is at
 
     y = -Z sin phi + n cos phi,   z = rho (1 - cos phi) + Z cos phi + n sin phi
 
@@ -17,12 +17,13 @@ wheels roll on it when the machine leans, so that the contacts move by rho sin p
     w_r = v_y - b W + rho_r (1 - cos phi) phi'                                                       rear
     Delta = delta cos eps / cos phi,   lambda_f = phi - delta sin eps,   lambda_r = phi
 
-Forces do the work that these velocities say. The pneumatic trail t_p adds -t_p Y about the road's normal. The air's drag acts at the
-height h, what drives at the rear contact, what brakes at the front one: with v' they make the moments that Sharp's model leaves out.
-u is the speed, or `SLOWEST` below it: there the tyre is a spring with some damping.
+Forces do the work that these velocities say. The pneumatic trail t_p adds -t_p Y about the road's normal. The air's drag acts at
+the height h, what drives at the rear contact, what brakes at the front one: with v' they make the moments that Sharp's model leaves
+out, and move load from wheel to wheel, which camber stiffness and trail follow. u is the speed, or `SLOWEST` below it: there the
+tyre is a spring with some damping.
 
-At phi = 0 without crown, trail, drag and v' this is Sharp's model to the last digits. Left out: pitch, squares of steer, change of
-load, saturation. Where Sharp prints no pitch inertia, frames are taken as flat: that about y is the sum of the other two.
+At phi = 0 without crown, trail, drag and v' this is Sharp's model to the last digits. Left out: pitch, squares of steer,
+saturation. Where Sharp prints no pitch inertia, frames are taken as flat: that about y is the sum of the other two.
 
 Sharp 1971, doi:10.1243/JMES_JOUR_1971_013_051_02; the crown: Cossalter 2006 (Motorcycle Dynamics, 2nd ed.), chapters 1, 4.
 """
@@ -92,7 +93,6 @@ class LeanParameters:
         return self.rear_crown + (self.front_crown - self.rear_crown) * (X + p.b) / (p.front + p.b)
 
 
-
 # What the rates depend on: the linear model's states, the rider's torque, a moment about the road that leans to the right, N m.
 LEAN_STATES = (*STATES, "rider_torque", "roll_moment")
 
@@ -134,10 +134,8 @@ def _equations(
     p: LeanParameters, x: Value, v: Value, dv: Value, S: Value, C: Value, by_state: Callable[[Value], Value]
 ) -> tuple[Value, Value, Value]:
     """M, shape (4, 4), and the right side of M a, shape (4, 1), a = (v_y', W', phi'', delta''); Y', shape (2, 1)."""
-    import casadi as ca
-
     q = p.sharp
-    phi, d, v_y, W, w, dd, Y_f, Y_r, tau, M_phi = ca.vertsplit(x)
+    phi, d, v_y, W, w, dd, Y_f, Y_r, tau, M_phi = (x[i] for i in range(10))
     moving = ca.vertcat(v_y, W, w, dd)
     # v for the wheels' spin, whose rate is a coordinate of its own, and the front wheel's load.
     spin, load = ca.SX.sym("spin"), ca.SX.sym("load")
@@ -180,10 +178,8 @@ def _energies(
     p: LeanParameters, d: Value, moving: Value, v: Value, spin: Value, load: Value, S: Value, C: Value
 ) -> tuple[Value, Value]:
     """Kinetic energy, with the spinning wheels' share that is linear in the turn rates, and the potential one, J."""
-    import casadi as ca
-
     q = p.sharp
-    v_y, W, w, dd = ca.vertsplit(moving)
+    v_y, W, w, dd = (moving[i] for i in range(4))
     ce, se = cos(q.eps), sin(q.eps)
     k, j = (q.a + q.e) * ce - q.f * se, (q.a + q.e) * se + q.f * ce
     low, low_k = q.h - p.crown(0.0), j - p.crown(k)

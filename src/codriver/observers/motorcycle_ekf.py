@@ -11,21 +11,24 @@ road that nothing else explains: a leaning rider, a side wind, feet on the groun
     a_y = v_y' + v W + X W' - Z (phi'' cos phi - phi'^2 sin phi) - n (phi'' sin phi + phi'^2 cos phi) + W^2 (Z sin phi - n cos phi)
     a_z = (rho - Z)(phi'' sin phi + phi'^2 cos phi) + n (phi'' cos phi - phi'^2 sin phi)
 
-with v_y', W', phi'' from the model, so that what the tyres do is told by the accelerometer. No acceleration is squared away, no turn
-is taken as balanced, no pitch rate as zero.
+with v_y', W', phi'' from the model, so that what the tyres do is told by the accelerometer. No acceleration is squared away, no
+turn is taken as balanced, no pitch rate as zero.
 
-**Tick.** x+ = x + (dt + A dt^2/2 + ...) f(x), F = 1 + A dt + A^2 dt^2/2 + ... with A at the last estimate, as many terms as the tick
-needs up to the greatest speed (`_terms`). Rows one at a time, where fresh. v and v' come from the speed by a tracker of `TRACKING` rad/s.
+**Tick.** x+ = x + (dt + A dt^2/2 + ...) f(x), F = 1 + A dt + A^2 dt^2/2 + ... with A at the last estimate, as many terms as the
+tick needs up to the greatest speed. Rows one at a time, where fresh. v and v' come from the speed by `track_speed`.
 
-**Start** at the first tick that has everything, at sin phi = (f_y - v r) / g: exact in a steady turn at any lean, and at rest. A gap of
-`GAP` s, or a roll beyond `STEEPEST`, starts it anew.
+**Start** at the first tick that has everything, at sin phi = (f_y - v r) / g: exact in a steady turn at any lean, and at rest. A
+gap of `GAP` s, or a roll beyond `STEEPEST`, starts it anew.
 
-**Noise.** What a row's samples scatter by is learnt from their second differences, which a motorcycle leaves alone and noise does not:
-var = mean (y_k - 2 y_(k-1) + y_(k-2))^2 / 6, beside a floor for what the model leaves out. The model's own noise is `EkfNoise`.
+**Noise.** What a sensor's samples scatter by is learnt from their second differences (`learn_scatter`), beside a floor for what
+the model leaves out. The model's own noise is `EkfNoise`; its defaults were chosen so that bands cover machines that are told wrong
+(docs/motorcycle.md).
 
-**Slow.** Below `SLOW` m/s M_phi may be anything, since feet may be on the ground: roll is then gyroscope's and gravity's; `slow` is 1.
-`speed_in_range` is 0 outside the speeds given, `valid` is 1 where speed is in range and not slow, signals come, and the roll's
-standard deviation is below `SURE`.
+**Slow.** Below `SLOW` m/s feet may be on the ground, so that M_phi may be anything: roll is then gyroscope's and gravity's. `slow`
+is 1 there, `speed_in_range` 0 outside the speeds given; `valid` is 1 where the speed is in range and not slow, signals come, and
+the roll's standard deviation is below `SURE`.
+
+Sharp 1971 and Cossalter 2006 as in `motorcycle_lean`; the filter: Jazwinski 1970 (Stochastic Processes and Filtering Theory), 8.3.
 """
 
 from __future__ import annotations
@@ -34,7 +37,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from codriver.errors import DesignError
 from codriver.kernel import Scalar, both, negate, select, sqrt
 from codriver.models.motorcycle_lean import LEAN_STATES, LeanParameters, lean_functions
 from codriver.names import quantity
@@ -149,7 +151,8 @@ def motorcycle_ekf(
         slowness = select(v < SLOW[0], 1.0, select(v > SLOW[1], 0.0, (SLOW[1] - v) / (SLOW[1] - SLOW[0])))
 
         now = unpack(carry, N)
-        x, P = ca.vertcat(*now.x), ca.vertcat(*[ca.horzcat(*row) for row in now.P])
+        x: Scalar = ca.vertcat(*now.x)
+        P: Scalar = ca.vertcat(*[ca.horzcat(*row) for row in now.P])
         f, A = linear(x[:LEAN], v, dv, ca.sin(x[0]), ca.cos(x[0]))
         whole = ca.SX(N, N)
         whole[:MOVING, :LEAN] = A
@@ -169,9 +172,10 @@ def motorcycle_ekf(
         x = ca.vertcat(*found)
         S, C = ca.sin(x[0]), ca.cos(x[0])
         expected, H = show(x, rates(x[:LEAN], v, dv, S, C)[2:5], A[2:5, :], v, S, C)
-        done, out = Moments(found, covariance), {}
+        done = Moments(found, covariance)
+        out: Scalars = {}
         for k, row in enumerate(ROWS):
-            fresh = both(ok[row], active)
+            fresh = both(ok[row], begun)  # the sample that it starts from is not taken twice
             value = expected[k] + sum(H[k, i] * (done.x[i] - found[i]) for i in range(N))
             e = select(fresh, y[row] - value, 0.0)
             R = floors[row] ** 2 + (scatter[f"scatter_{row}"] if row in IMU else 0.0)
@@ -261,7 +265,10 @@ def _outputs(low: float, high: float) -> tuple[Output, ...]:
     for name in STATES:
         unit = quantity(name.removesuffix("_bias")).unit
         meaning = f"bias of {name[:-5]}" if name.endswith("_bias") else quantity(name).meaning
-        outputs += [Output(name, unit, "estimate", meaning), Output(f"{name}_sd", unit, "sd", f"standard deviation of {name}")]
+        outputs += [
+            Output(name, unit, "estimate", meaning),
+            Output(f"{name}_sd", unit, "sd", f"standard deviation of {name}"),
+        ]
     for row in ROWS:
         unit, name = quantity(row).unit, f"{row}_innovation"
         outputs += [

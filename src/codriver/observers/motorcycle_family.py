@@ -9,8 +9,8 @@
 | motorcycle-imu    | roll alone, from gyroscope and speed; needs no vehicle         | yes   | roll  |
 
 Signals are the IMU's, in body axes: roll_rate, pitch_rate and yaw_rate about the machine's own x, y and z, lateral_acceleration
-and vertical_acceleration along its own y and z. heading_rate, an output, is about the road's normal. The two in the middle have their
-measurements turned into the road's frame in front (`road_frame`), and their steer rate from a differentiator.
+and vertical_acceleration along its own y and z. heading_rate, an output, is about the road's normal. In front of motorcycle-ts and
+motorcycle-uio measurements are turned into the road's frame (`road_frame`), and a differentiator makes the steer rate.
 
 Damon, Ichalal, Arioui 2018, and what it compares itself with.
 """
@@ -48,8 +48,7 @@ def _ekf(vehicle: Vehicle | None, design: Design) -> Observer:
 def _kalman(vehicle: Vehicle | None, design: Design) -> Observer:
     assert vehicle is not None
     model = motorcycle_model(MotorcycleParameters.from_vehicle(vehicle)).with_walking_inputs()
-    form = "constant" if design.form == "constant" else "kalman"
-    return _of(vehicle, motorcycle_kalman(model, design.dt, form=form))
+    return _of(vehicle, motorcycle_kalman(model, design.dt, form="constant" if design.form == "constant" else "kalman"))
 
 
 def _ts(vehicle: Vehicle | None, design: Design) -> Observer:
@@ -105,8 +104,8 @@ def on_the_road(observer: Observer) -> Observer:
 
 register(Estimator(
     "motorcycle-ekf", PARAMETERS, NEEDED,
-    "roll, tyre forces and rider's torque at any lean, from the IMU's raw signals, steer angle and speed; finds biases", FAMILY, _ekf,
-    forms=("kalman",),
+    "roll, tyre forces and rider's torque at any lean, from the IMU's raw signals, steer angle and speed; finds biases", FAMILY,
+    _ekf, forms=("kalman",),
 ))  # fmt: skip
 register(Estimator(
     "motorcycle-kalman", PARAMETERS, BALANCED,

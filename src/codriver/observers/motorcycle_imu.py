@@ -1,11 +1,11 @@
 """Roll from gyroscope and speed alone: the baseline that everybody has.
 
-    phi' = p - b_p + w,     phi_m = -asin(c v r / g) + e       p, r in body axes; r = W cos phi, so that sin phi = -v r / g in a turn
+    phi' = p - b_p + w,     phi_m = -asin(c v r / g) + e        p, r in body axes; sin phi = -v r / g in a turn
 
-The roll rate is added up, and held by the lean of a balanced turn, with the rate's bias b_p as a state: a Kalman filter of two states,
-which settles to the usual complementary filter. phi_m errs slowly, with the manoeuvre; an error of sd s that lasts T seconds counts as
-white noise of intensity 2 s^2 T. c = 1 is a point mass on thin tyres. With a motorcycle's parameters c puts right, for small leans, what
-crowns rho and the wheels' spin take:
+The roll rate is added up, and held by the lean of a balanced turn, with the rate's bias b_p as a state: a Kalman filter of two
+states, which settles to the usual complementary filter. phi_m errs slowly, with the manoeuvre; an error of sd s that lasts T s
+counts as white noise of intensity 2 s^2 T. c = 1 is a point mass on thin tyres. With a motorcycle's parameters c puts right, for
+small leans, what crowns rho and the wheels' spin take:
 
     c = (H + sum(i / R) / M) / (H - rho),    H height of the mass centre, rho at it
 
@@ -22,7 +22,7 @@ from math import pi
 
 import numpy as np
 
-from codriver.kernel import Scalar, both, either, minimum, negate, select, sqrt
+from codriver.kernel import both, either, minimum, negate, select, sqrt
 from codriver.models.motorcycle_lean import LeanParameters
 from codriver.models.road_frame import GRAVITY
 from codriver.models.road_frame import STEEPEST as STEEPEST_SINE
@@ -127,7 +127,9 @@ def motorcycle_imu(dt: float = 0.01, correction: float = 1.0, noise: ImuNoise | 
         Output("roll_angle_sd", "rad", "sd", "standard deviation of roll_angle"),
         Output("roll_rate_bias", "rad/s", "estimate", "bias of roll_rate"),
         Output("roll_rate_bias_sd", "rad/s", "sd", "standard deviation of roll_rate_bias"),
-        Output("turn_innovation", "rad", "innovation", "lean of a balanced turn less predicted; 0 where none is to be had"),
+        Output(
+            "turn_innovation", "rad", "innovation", "lean of a balanced turn less predicted; 0 where none is to be had"
+        ),
         Output("turn_innovation_sd", "rad", "innovation_sd", "standard deviation of turn_innovation"),
         Output("lean_in_range", "1", "flag", "1 where v r / g is below the sine of the greatest lean"),
         Output("valid", "1", "flag", "1 where signals come, it moves, and the roll is known to 5 degrees"),

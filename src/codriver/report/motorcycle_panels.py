@@ -14,7 +14,11 @@ from codriver.report.shown import shown, shown_unit
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#007A5A", "#C84C00", "#757575"
 FORCES = (("front_lateral_force", "front", BLUE, "rgba(0,114,178,0.22)"),
           ("rear_lateral_force", "rear", RED, "rgba(200,76,0,0.18)"))  # fmt: skip
-RATES = (("roll_rate_bias", "roll rate", BLUE), ("pitch_rate_bias", "pitch rate", ORANGE), ("yaw_rate_bias", "yaw rate", RED))
+RATES = (
+    ("roll_rate_bias", "roll rate", BLUE),
+    ("pitch_rate_bias", "pitch rate", ORANGE),
+    ("yaw_rate_bias", "yaw rate", RED),
+)
 ACCELERATIONS = (("lateral_acceleration_bias", "lateral", BLUE), ("vertical_acceleration_bias", "vertical", RED))
 # What has a panel of its own here, or none.
 DRAWN = (
@@ -46,11 +50,19 @@ def motorcycle_panels(
     """
     made = [
         Panel("Lean of the machine, positive to the right", shown_unit("roll_angle"), 240, roll, estimate.valid),
-        Panel("Torque of the rider on the handlebar, positive to the left", shown_unit("rider_torque"), 200, torque, estimate.valid)
+        Panel(
+            "Torque of the rider on the handlebar, positive to the left",
+            shown_unit("rider_torque"),
+            200,
+            torque,
+            estimate.valid,
+        )
         if torque
         else None,
         _forces(estimate),
-        Panel("Steer angle, positive to the left", shown_unit("steer_angle"), 130, steer, estimate.valid) if steer else None,
+        Panel("Steer angle, positive to the left", shown_unit("steer_angle"), 130, steer, estimate.valid)
+        if steer
+        else None,
         _moment(estimate),
         _biases(estimate, "Biases of the gyroscope", RATES, "roll_rate"),
         _biases(estimate, "Biases of the accelerometer", ACCELERATIONS, "lateral_acceleration"),
@@ -100,7 +112,9 @@ def _flags(estimate: Estimate) -> Panel | None:
         raised = estimate.flag(name) == bool(bad)
         if raised.any():
             height = float(len(lines) + 1)
-            lines.append(Line(legend, np.where(raised, height, np.nan), (GREY, RED, ORANGE, GREEN, BLUE)[len(lines) % 5], 5.0))
+            lines.append(
+                Line(legend, np.where(raised, height, np.nan), (GREY, RED, ORANGE, GREEN, BLUE)[len(lines) % 5], 5.0)
+            )
     if not lines:
         return None
     everywhere = np.ones(len(estimate.grid), bool)
