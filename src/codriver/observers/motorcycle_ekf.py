@@ -63,7 +63,8 @@ STATES = (
 )  # fmt: skip
 N, MOVING, LEAN = len(STATES), 8, len(LEAN_STATES)
 ROLL, TURN, LEANING, MOMENT, PITCHING, BIASES = 0, 3, 4, 9, 10, 11
-PITCH_TIME, MOMENT_TIME = 0.2, 2.0  # s
+PITCH_TIME, MOMENT_TIME, TILT_TIME = 0.2, 0.5, 0.5  # s
+TILTED = {"roll_rate": TURN, "yaw_rate": LEANING}  # rows that see another rate where the machine is pitched
 TRACKING, SCATTER_TIME = 4.0, 2.0  # rad/s, s
 GAP, STALE = 1.0, 0.1  # s
 SLOW = (2.0, 4.0)  # m/s: all of it below the first, none above the second
@@ -85,6 +86,7 @@ class EkfNoise:
         torque: of the rider's torque's rate, N m/s per sqrt(Hz).
         moment, feet: sd of M_phi, N m, when riding and what is added when slow.
         pitch: sd of theta', rad/s.
+        tilt: sd of the pitch angle, rad, which turns p by W and r by phi' times itself, for `TILT_TIME` seconds.
         gyro_walk, accelerometer_walk: of the biases, rad/s and m/s^2 per sqrt(s).
         gyro, lateral_force, vertical_force, encoder: floors of the rows' sd, rad/s, m/s^2, rad.
     """
@@ -95,14 +97,15 @@ class EkfNoise:
     steer: float = 0.4
     tyre: float = 400.0
     torque: float = 25.0
-    moment: float = 8.0
+    moment: float = 20.0
     feet: float = 600.0
     pitch: float = 0.03
-    gyro_walk: float = 1e-4
+    gyro_walk: float = 0.0005
     accelerometer_walk: float = 1e-3
-    gyro: float = 0.003
+    tilt: float = 0.012
+    gyro: float = 0.005
     lateral_force: float = 0.05
-    vertical_force: float = 0.3
+    vertical_force: float = 0.7
     encoder: float = 0.0005
 
     def process(self) -> Array:
@@ -179,6 +182,9 @@ def motorcycle_ekf(
             value = expected[k] + sum(H[k, i] * (done.x[i] - found[i]) for i in range(N))
             e = select(fresh, y[row] - value, 0.0)
             R = floors[row] ** 2 + (scatter[f"scatter_{row}"] if row in IMU else 0.0)
+            if row in TILTED:
+                seen = noise.tilt * found[TILTED[row]]
+                R = R + seen * seen * (2 * TILT_TIME / dt)
             mean, covariance, s = update_row(done.x, done.P, [H[k, i] for i in range(N)], e, R, fresh)
             done = Moments(mean, covariance)
             out |= {f"{row}_innovation": e, f"{row}_innovation_sd": sqrt(s)}
