@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
 import codriver as cd
 from codriver.errors import DesignError
+from codriver.export import export_c
 from codriver.models import MotorcycleParameters, motorcycle_model
 from codriver.models.motorcycle_lean import LeanParameters
 from codriver.observers import best, build
@@ -166,6 +170,23 @@ class TestFamily:
             outputs = [o.name for o in build(name, vehicle(), dt=0.01).outputs]
             assert "heading_rate" in outputs
             assert "yaw_rate" not in outputs
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("name", ALL)
+def test_exported(name, real, tmp_path):
+    """In C as here: bit for bit in double, within the README's tolerance in float."""
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    if name == "motorcycle-ts":
+        pytest.importorskip("cvxpy")
+    export_c(cd.compile(build(name, vehicle(), dt=0.01)), tmp_path, real)
+    sources = sorted(map(str, tmp_path.glob("*.c")))
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off"]
+    subprocess.run(["gcc", *strict, *sources, "-o", tmp_path / "check", "-lm"], check=True)
+    ran = subprocess.run([tmp_path / "check"], capture_output=True, text=True)
+    assert ran.stdout.startswith("ok: 400 rows"), ran.stdout
 
 
 @pytest.mark.slow
