@@ -24,7 +24,6 @@ from codriver.testing import check_observer
 from rides import DEGREE, errors, lane_change_ride, leaning_ride, noisy, ride_log, rms, slalom_ride, vehicle
 
 LOW, HIGH, DT = 8.0, 40.0, 0.005
-ALL = ("motorcycle-ekf", "motorcycle-kalman", "motorcycle-ts", "motorcycle-uio", "motorcycle-imu")
 
 
 @pytest.fixture(scope="module")
@@ -173,15 +172,20 @@ class TestFamily:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("real", ["double", "float"])
-@pytest.mark.parametrize("name", ALL)
-def test_exported(name, real, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "form", "real"),
+    [
+        ("motorcycle-ekf", "kalman", "double"), ("motorcycle-kalman", "constant", "float"), ("motorcycle-ts", "kalman", "float"),
+        ("motorcycle-uio", "kalman", "double"),
+    ],
+)  # fmt: skip
+def test_exported(name, form, real, tmp_path):
     """In C as here: bit for bit in double, within the README's tolerance in float."""
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed")
     if name == "motorcycle-ts":
         pytest.importorskip("cvxpy")
-    export_c(cd.compile(build(name, vehicle(), dt=0.01)), tmp_path, real)
+    export_c(cd.compile(build(name, vehicle(), dt=0.01, form=form)), tmp_path, real)
     sources = sorted(map(str, tmp_path.glob("*.c")))
     strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off"]
     subprocess.run(["gcc", *strict, *sources, "-o", tmp_path / "check", "-lm"], check=True)
