@@ -13,6 +13,7 @@ from codriver.errors import DesignError
 from codriver.models.motorcycle_lean import LeanParameters, lean_functions
 from codriver.names import quantity
 from codriver.observers import motorcycle_ekf as ekf
+from codriver.report.panels import panels
 from codriver.testing import check_observer
 from rides import BIASES, DEGREE, errors, lane_change_ride, leaning_ride, noisy, ride_log, rms, slalom_ride, vehicle
 
@@ -168,6 +169,22 @@ class TestRide:
         assert found.columns["roll_angle_sd"][k] > 1.5 * found.columns["roll_angle_sd"][int(1.49 / 0.005)]
         assert found.valid[-100:].all()
         assert rms(errors(found, done, "roll_angle", 2.5)) < 0.6 * DEGREE
+
+
+def test_report(estimate):
+    """Lean first, then torque, forces, steer, biases; flags only where one is raised; truth beside where it is there."""
+    done = leaning_ride()
+    truth = cd.Log.of([cd.Signal("roll_angle", done.time, done.of("roll"), "rad")])
+    made = panels(estimate, truth)
+    titles = [panel.title.split(",")[0] for panel in made]
+    assert titles[:4] == [
+        "Lean of the machine", "Torque of the rider on the handlebar", "Lateral forces of the tyres", "Steer angle",
+    ]  # fmt: skip
+    assert len(set(titles)) == len(titles)
+    assert [item.name for item in made[0].items] == ["95% band", "estimate, not valid", "estimate", "true"]
+    assert {"Biases of the gyroscope", "Biases of the accelerometer", "Flags"} <= set(titles)
+    flags = made[titles.index("Flags")]
+    assert [line.name for line in flags.items] == ["not valid"]
 
 
 def at_rest(roll: np.ndarray, t: np.ndarray, gyro_bias: float) -> cd.Log:

@@ -36,7 +36,11 @@ NAMES = {
     "force_y": "lateral_acceleration", "force_z": "vertical_acceleration", "steer_angle": "steer_angle",
     "speed": "longitudinal_speed",
 }  # fmt: skip
-TRUTH = (("roll_angle", "roll", DEGREE), ("rider_torque", "rider_torque", 1.0), ("front_lateral_force", "front_lateral_force", 1.0))
+TRUTH = (
+    ("roll_angle", "roll", DEGREE),
+    ("rider_torque", "rider_torque", 1.0),
+    ("front_lateral_force", "front_lateral_force", 1.0),
+)
 
 
 def rides(machine: Machine) -> dict[str, Ride]:
