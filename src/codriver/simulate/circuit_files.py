@@ -3,6 +3,7 @@
 drive.csv       what the simulator logs: wheel angle, torque, and what its vehicle model and scene know
 names.toml      what the columns mean
 truth.parquet   the driver's torque, the wheel's angle and rate, and where the two points were
+vehicle.toml    column and car
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from codriver.signals import Log
 from codriver.signals.signal import Array
 from codriver.simulate.circuit import CircuitDrive, CircuitSetting, simulate_circuit
 from codriver.simulate.folder import refuse_foreign, write_folder
+from codriver.vehicles import Vehicle, save_vehicle
 
-FILES = ("drive.csv", "names.toml", "truth.parquet")
+FILES = ("drive.csv", "names.toml", "truth.parquet", "vehicle.toml")
 _DEGREE = 180 / pi
 # Standard name, column, unit in the file, factor from SI, digits.
 _COLUMNS = (
@@ -38,6 +40,7 @@ class CircuitFiles:
     drive: Path
     names: Path
     truth: Path
+    vehicle: Path
 
 
 def write_circuit(
@@ -69,6 +72,22 @@ def _write(drive: CircuitDrive, folder: Path) -> None:
     truth = drive.truth()
     columns = [Column(signal.name, signal.values, signal.unit) for signal in truth.values()]
     write_table(files.truth, drive.time, columns, {"source": truth.source, "seed": str(drive.seed)})
+    save_vehicle(circuit_vehicle(drive.setting), files.vehicle)
+
+
+def circuit_vehicle(setting: CircuitSetting) -> Vehicle:
+    """Column and car of a drive."""
+    car, wheel = setting.car, setting.wheel
+    made = Vehicle("circuit", "Column and car of the simulated circuit", "codriver simulate circuit", {})
+    values = {
+        "mass": car.mass, "yaw_inertia": car.inertia, "front_axle_distance": car.front, "wheelbase": car.front + car.rear,
+        "front_cornering_stiffness": car.front_stiffness, "rear_cornering_stiffness": car.rear_stiffness,
+        "steering_ratio": car.ratio, "alignment_stiffness": car.alignment, "steering_inertia": wheel.inertia,
+        "steering_damping": wheel.damping, "steering_friction": wheel.friction,
+    }  # fmt: skip
+    for name, value in values.items():
+        made = made.with_parameter(name, value)
+    return made
 
 
 def _table(time: Array, log: Log) -> str:
