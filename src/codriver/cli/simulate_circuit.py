@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from codriver.simulate.rig import RigCar
 
 Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.", show_default=False)]
 Driver = Annotated[str, typer.Option("--driver", help="anna, ben, carla, david or emma.")]
@@ -37,25 +40,19 @@ def circuit(
 
     Example: codriver simulate circuit -o laps --driver ben
     """
-    from dataclasses import replace
-
     from codriver.cli.terminal import console
-    from codriver.errors import UsageError
     from codriver.identify.regression import rms
     from codriver.simulate.circuit import CircuitSetting
     from codriver.simulate.circuit_drivers import circuit_driver
     from codriver.simulate.circuit_files import FILES, write_circuit
     from codriver.simulate.folder import refuse_earlier, refuse_foreign
-    from codriver.simulate.rig import RigCar
     from codriver.simulate.variability import Variability
 
     refuse_foreign(out, "circuit", FILES)
     refuse_earlier(out, overwrite)
-    if not 10 <= speed <= 120:
-        raise UsageError(f"--speed {speed:g}", "10 to 120 km/h", "choose one of these")
     setting = CircuitSetting(
         circuit_driver(driver), Variability() if variability else None, anticipation, laps=laps, direction=direction,
-        car=replace(RigCar(), speed=speed / 3.6),
+        car=car_at(speed),
     )  # fmt: skip
     files, drive = write_circuit(out, setting, seed)
     console().print(
@@ -66,3 +63,19 @@ def circuit(
         f"wrote {', '.join(str(p) for p in vars(files).values())}",
         markup=False,
     )
+
+
+def car_at(speed: float) -> RigCar:
+    """The circuit's car at a speed, km/h.
+
+    Raises:
+        UsageError: it is no speed for the circuit.
+    """
+    from dataclasses import replace
+
+    from codriver.errors import UsageError
+    from codriver.simulate.rig import RigCar
+
+    if not 10 <= speed <= 120:
+        raise UsageError(f"--speed {speed:g}", "10 to 120 km/h", "choose one of these")
+    return replace(RigCar(), speed=speed / 3.6)

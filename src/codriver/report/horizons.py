@@ -29,8 +29,8 @@ def horizon_document(found: HorizonErrors, drives: Sequence[str], notes: Sequenc
     left = ", ".join(found.left_out) or "none"
     return Document(
         "How far ahead a driver's torque can be foretold",
-        f"Models foretell {found.target} up to {found.horizons[-1]:g} s ahead. Every part of the data is held out once and foretold by "
-        "models that learnt from the rest. All know the past and the road ahead, and nothing else.",
+        f"Models foretell {found.target} up to {found.horizons[-1]:g} s ahead. Every part of the data is held out once and "
+        "foretold by models that learnt from the rest. All know the past and the road ahead, and nothing else.",
         (
             Section("Verdict", tuple(said)),
             Section("Error against horizon", (_errors(found), _table(found))),
@@ -107,7 +107,7 @@ def _forecasts(found: HorizonErrors) -> Chart:
     return Chart(
         "Forecasts, one a second, over the torque that came", "time from the start of the stretch (s)",
         (Plot("torque (N m)", tuple(curves), 340),),
-        f"The {SHOWN:g} s in which the torque varies most; the models had not seen them. Each line starts at the torque of its moment.",
+        f"The {SHOWN:g} s in which the torque varies most; the models had not seen them. Each line starts at the torque then.",
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ vehicle.toml    column and car
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
@@ -29,7 +30,7 @@ _COLUMNS = (
     ("alignment_torque", "AlignTorque", "N*m", 1.0, 5), ("longitudinal_speed", "Speed", "km/h", 3.6, 3),
     ("sideslip_angle", "Sideslip", "rad", 1.0, 7), ("yaw_rate", "YawRate", "rad/s", 1.0, 7),
     ("road_curvature", "RoadCurvature", "1/m", 1.0, 7), ("lateral_offset", "LaneOffset", "m", 1.0, 5),
-    ("heading_error", "HeadingError", "rad", 1.0, 7),
+    ("heading_error", "HeadingError", "rad", 1.0, 7), ("steering_motor_torque", "MotorTorque", "N*m", 1.0, 4),
 )  # fmt: skip
 
 
@@ -60,17 +61,26 @@ def write_circuit(
     folder = Path(folder)
     refuse_foreign(folder, "circuit", FILES)
     drive = simulate_circuit(setting, seed=seed)
-    write_folder(folder, lambda scratch: _write(drive, scratch), "circuit", FILES)
+    write_folder(folder, lambda scratch: write_files(drive, scratch), "circuit", FILES)
     return CircuitFiles(*(folder / name for name in FILES)), drive
 
 
-def _write(drive: CircuitDrive, folder: Path) -> None:
+def write_files(drive: CircuitDrive, folder: Path, more: Mapping[str, tuple[Array, str]] | None = None) -> None:
+    """Write the files of FILES.
+
+    Args:
+        drive: what happened.
+        folder: that is there.
+        more: columns of the truth by name: values of shape (n,) and unit.
+    """
     files, log = CircuitFiles(*(folder / name for name in FILES)), drive.log()
-    files.drive.write_text(_table(drive.time, log), encoding="utf-8")
-    names = "".join(f'[{name}]\nsource = "{column}"\nunit = "{unit}"\n\n' for name, column, unit, _, _ in _COLUMNS)
+    there = [column for column in _COLUMNS if column[0] in log]
+    files.drive.write_text(_table(drive.time, log, there), encoding="utf-8")
+    names = "".join(f'[{name}]\nsource = "{column}"\nunit = "{unit}"\n\n' for name, column, unit, _, _ in there)
     files.names.write_text(f"# The log of a drive round the simulated circuit.\n{names}", encoding="utf-8")
     truth = drive.truth()
     columns = [Column(signal.name, signal.values, signal.unit) for signal in truth.values()]
+    columns += [Column(name, values, unit) for name, (values, unit) in (more or {}).items()]
     write_table(files.truth, drive.time, columns, {"source": truth.source, "seed": str(drive.seed)})
     save_vehicle(circuit_vehicle(drive.setting), files.vehicle)
 
@@ -90,9 +100,9 @@ def circuit_vehicle(setting: CircuitSetting) -> Vehicle:
     return made
 
 
-def _table(time: Array, log: Log) -> str:
+def _table(time: Array, log: Log, columns: Sequence[tuple[str, str, str, float, int]]) -> str:
     """A CSV with a column of time first."""
-    form = ",".join(["{:.3f}", *(f"{{:.{digits}f}}" for *_, digits in _COLUMNS)])
-    values = [(np.round(log[name].values * factor, digits) + 0.0).tolist() for name, _, _, factor, digits in _COLUMNS]
+    form = ",".join(["{:.3f}", *(f"{{:.{digits}f}}" for *_, digits in columns)])
+    values = [(np.round(log[name].values * factor, digits) + 0.0).tolist() for name, _, _, factor, digits in columns]
     rows = [form.format(*row) for row in zip(time.tolist(), *values, strict=True)]
-    return "\n".join([",".join(["t", *(column for _, column, *_ in _COLUMNS)]), *rows, ""])
+    return "\n".join([",".join(["t", *(column for _, column, *_ in columns)]), *rows, ""])
