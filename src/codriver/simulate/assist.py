@@ -83,7 +83,7 @@ class Assist:
     gain: float = 1.0
     stiffness: float = 2.0
     ahead: float = 0.7
-    lag: float = 0.03
+    lag: float = 0.1
     limit: float = 5.0
     rate: float = 40.0
     fade: Fade | None = field(default_factory=Fade)
