@@ -54,6 +54,11 @@ def compiled(kind: str = "ridge") -> Program:
     return compile(observer_of(anna(kind)))
 
 
+@cache
+def unhelped() -> CircuitDrive:
+    return simulate_circuit(VARYING, seed=4)
+
+
 def along(setting: CircuitSetting, path: PathAhead, n: int, assist: Assist, **more: object) -> CircuitDrive:
     """A drive along a path with an assist, by a driver who is always the same and a sensor without noise."""
     given = {"varied": Variation.none(n), "noise": np.zeros(n), "model": None, **more}
@@ -71,7 +76,7 @@ def turn(setting: CircuitSetting, seconds: float, curvature: float) -> tuple[Pat
 class TestLoop:
     @pytest.mark.parametrize("kind", ["none", "present", "predicted", "path"])
     def test_gain_0_is_the_drive_alone_to_the_bit(self, kind: str) -> None:
-        alone = simulate_circuit(VARYING, seed=4)
+        alone = unhelped()
         shared = simulate_shared(SharedSetting(VARYING, Assist(kind, 0.0)), compiled(), seed=4).drive
         for name in ("angle", "rate", "driver_torque", "measured_torque", "offset", "heading", "yaw_rate"):
             assert np.array_equal(getattr(shared, name), getattr(alone, name))
@@ -188,6 +193,7 @@ class TestForetold:
         assert np.array_equal(one.motor_torque[: k + 1], two.motor_torque[: k + 1])
         assert not np.array_equal(one.motor_torque[k + 1 :], two.motor_torque[k + 1 :])
 
+    @pytest.mark.slow
     def test_who_is_used_to_it_steers_as_before_with_less_torque(self) -> None:
         """Per mille of the offset; half the torque: what is foretold is no better than power steering there."""
         alone = outcome(simulate_shared(SharedSetting(VARYING), seed=3))
@@ -298,16 +304,16 @@ class TestStability:
         assert bare == pytest.approx(slowest_decay(SharedSetting(ONE_LAP, Assist("present", 0.0, lag=1e-3))))
         with pytest.raises(UsageError, match="simulate it"):
             slowest_decay(SharedSetting(ONE_LAP, Assist("predicted")))
+        wild = replace(ONE_LAP.driver, reflex=60.0)
         with pytest.raises(UsageError, match="unstable without assist"):
-            wild = replace(ONE_LAP.driver, reflex=60.0)
             largest_gain(SharedSetting(replace(ONE_LAP, driver=wild), Assist("present")))
 
+    @pytest.mark.slow
     def test_a_predicted_torque_shakes_later_than_the_present_one(self) -> None:
         """Stiff arms and a gain of 1: power steering shakes, what is foretold does not follow quick torques."""
         stiff = replace(VARYING, driver=circuit_driver("emma"))
-        model = compile(
-            observer_of(fit_driver([driven("emma", 1, direction="left"), driven("emma", 2, direction="left")], "ridge"))
-        )
+        drives = [driven("emma", seed, direction="left") for seed in (1, 2)]
+        model = compile(observer_of(fit_driver(drives, "ridge")))
         found = compare_assists(
             stiff, {k: Assist(k, 1.0, fade=None) for k in ("none", "present", "predicted")}, model, (3,)
         )
@@ -345,6 +351,7 @@ class TestOutcomes:
         slope = np.gradient(d.offset, d.time)[late] / ONE_LAP.car.speed
         assert found.heading == pytest.approx(np.sqrt(np.mean(slope**2)), rel=0.01)
 
+    @pytest.mark.slow
     def test_mean_sd_and_change(self) -> None:
         found = compare_assists(VARYING, {"none": Assist(), "path": Assist("path", 1.0)}, seeds=(1, 2))
         mean, spread = mean_outcome(found["none"])
@@ -362,6 +369,7 @@ class TestOutcomes:
 
 
 class TestCommand:
+    @pytest.mark.slow
     def test_with_and_without(self, tmp_path) -> None:
         model, out, report = tmp_path / "anna.driver", tmp_path / "helped", tmp_path / "helped.html"
         save_driver(anna(), model)

@@ -3,9 +3,9 @@
     x = (driver's states, delta_s, omega, beta, r, psi, y, T_a)          x' = A(g) x
     T_a' = (asked - T_a) / tau                                           asked: `assist`, "present" or "path"
 
-Friction, limit, rate, fading and noise are left out, the visual delay is a Pade fraction of second order, and nothing ticks: a motor
-that ticks has a little less margin. Arms that hold the wheel stiffly through a lagging muscle are a spring that answers late; a motor
-that multiplies their torque makes it stiffer, and late enough it pushes instead of holding.
+Friction, limit, rate, fading and noise are left out, the visual delay is a Pade fraction of second order, and nothing ticks: a
+motor that ticks has a little less margin. Arms that hold the wheel stiffly through a lagging muscle are a spring that answers late;
+a motor that multiplies their torque makes it stiffer, and late enough it pushes instead of holding.
 """
 
 from __future__ import annotations
