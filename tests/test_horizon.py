@@ -271,6 +271,8 @@ def test_refusals() -> None:
     log = driven()
     with pytest.raises(UsageError, match=r"horizons 0\.25 s"):
         error_against_horizon({"anna": log}, ("ridge",), (0.25,))
+    with pytest.raises(UsageError, match=r"a horizon of 2\.8 s"):
+        error_against_horizon({"anna": log}, ("ridge",), (2.6, 2.8))
     with pytest.raises(UsageError, match="has a memory"):
         error_against_horizon({"anna": log}, ("hmm-gmr",), (0.2,), vehicle())
     bare = Log.of([s for s in log.values() if s.name != "sideslip_angle"], source="bare")

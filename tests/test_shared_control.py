@@ -31,6 +31,7 @@ from codriver.simulate.shared_outcomes import (
     mean_outcome,
     outcome,
     reversal_rate,
+    verdict,
 )
 from codriver.simulate.shared_stability import largest_gain, slowest_decay
 from codriver.simulate.steering import Wheel
@@ -364,6 +365,10 @@ class TestOutcomes:
         assert (change, error) == (pytest.approx(np.mean(each)), pytest.approx(abs(each[0] - each[1]) / 2))
         assert change < -0.2
         assert np.isnan(mean_outcome(found["none"][:1])[1].offset)
+        said = [(f.severity, f.text.split(":")[0]) for f in verdict(found)]
+        assert said[0] == ("ok", "path against no assist, off the path")
+        doubled = [replace(one, power=2 * one.power) for one in found["none"]]
+        assert verdict({"none": found["none"], "present": doubled})[0].severity == "bad"
         with pytest.raises(ValueError, match="no drive"):
             mean_outcome(list[Outcome]())
 

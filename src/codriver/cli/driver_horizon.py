@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from codriver.cli.driver import Drives, ProtocolName, Report, read_drives
+from codriver.cli.driver import Drives, Report, read_drives
 from codriver.cli.driver_use import app
 from codriver.cli.options import Bus, Dbc, Json, Names, VehicleName
 
@@ -27,7 +27,7 @@ def horizon(
     models: Annotated[
         list[str] | None, typer.Option("--model", help="Of which models; may be repeated.", show_default="ridge and guarded")
     ] = None,
-    dbc: Dbc = None, names: Names = None, bus: Bus = None, vehicle: VehicleName = None, protocol: ProtocolName = "honest",
+    dbc: Dbc = None, names: Names = None, bus: Bus = None, vehicle: VehicleName = None,
     folds: Annotated[int, typer.Option("--folds", min=2, help="Blocks, where one drive is given.")] = 4,
     report: Report = None, json: Json = False,
 ) -> None:  # fmt: skip
@@ -38,14 +38,12 @@ def horizon(
 
     Example: codriver driver horizon monday.csv tuesday.csv --names names.toml --horizons 0.2,1,2 --report horizon.html
     """
-    from dataclasses import replace
-
-    from codriver.cli.driver import protocol_of
     from codriver.cli.estimate import check_report
     from codriver.cli.terminal import command_line, working
     from codriver.drivers.learned.horizon import error_against_horizon
     from codriver.drivers.learned.horizon_errors import NAIVE
     from codriver.drivers.learned.kinds import DEFAULT, class_of
+    from codriver.drivers.learned.protocol import Protocol
     from codriver.logs.write import complete_or_nothing
     from codriver.report.document import write_document
     from codriver.report.horizons import horizon_document
@@ -55,12 +53,11 @@ def horizon(
         class_of(kind)
     check_report(report)
     wanted = parse_horizons(horizons)
-    chosen = replace(protocol_of(protocol, None), folds=folds)
     parts = max(folds, len(drives)) * len({*NAIVE, *kinds}) * (len(wanted) + 1)
     with working(not json, len(drives) + parts) as stage:
         logs, notes = read_drives(drives, dbc, names, bus, vehicle, stage)
         car, said = iterated_through(logs, vehicle)
-        found = error_against_horizon(logs, kinds, wanted, car, protocol=chosen, progress=stage)
+        found = error_against_horizon(logs, kinds, wanted, car, protocol=Protocol(folds=folds), progress=stage)
         if report is not None:
             with complete_or_nothing(report) as draft:
                 write_document(horizon_document(found, list(logs), [*notes, *said], command_line()), draft)

@@ -70,7 +70,7 @@ def shared(
     from codriver.simulate.folder import refuse_earlier, refuse_foreign
     from codriver.simulate.shared_control import SharedSetting, simulate_shared
     from codriver.simulate.shared_files import write_shared
-    from codriver.simulate.shared_outcomes import compare_assists
+    from codriver.simulate.shared_outcomes import compare_assists, verdict
     from codriver.simulate.variability import Variability
 
     refuse_foreign(out, "circuit", FILES)
@@ -102,6 +102,7 @@ def shared(
     told: dict[str, Any] = {
         "driver": driver, "assist": assist, "gain": gain, "used_to_it": used_to_it, "drives": drives, "seed": seed,
         "model": str(model) if model is not None else None, "outcomes": {k: _told(v) for k, v in found.items()},
+        "findings": [{"severity": f.severity, "text": f.text} for f in verdict(found)],
         "files": [str(p) for p in vars(files).values()], "report": str(report) if report is not None else None,
     }  # fmt: skip
     if json:
@@ -144,7 +145,7 @@ def _say(told: dict[str, Any]) -> None:
     """Show it."""
     from rich.table import Table
 
-    from codriver.cli.terminal import console
+    from codriver.cli.terminal import console, say_findings
     from codriver.simulate.shared_outcomes import FIGURES
 
     out = console()
@@ -159,6 +160,9 @@ def _say(told: dict[str, Any]) -> None:
         if any(cell != "-" for cell in cells):
             table.add_row(f"{words}, {unit}" if unit else words, *cells)
     out.print(table)
+    if told["findings"]:
+        out.print("\n[bold]verdict[/]:")
+        say_findings(out, told["findings"])
     written = [*told["files"], *([told["report"]] if told["report"] else [])]
     out.print(f"\nwrote {', '.join(written)}", markup=False)
 

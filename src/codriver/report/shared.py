@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from codriver.report.document import BLACK, GREY, Chart, Curve, Document, Plot, Section, Table
+from codriver.report.document import BLACK, GREY, Chart, Curve, Document, Findings, Plot, Section, Table
 from codriver.simulate.shared_control import SharedDrive
-from codriver.simulate.shared_outcomes import FIGURES, Outcome, change_of, mean_outcome
+from codriver.simulate.shared_outcomes import FIGURES, Outcome, change_of, mean_outcome, verdict
 
 SHOWN = 60.0  # s
 NAMES = {"none": "no assist", "present": "power steering", "predicted": "foretold torque", "path": "back to the path"}
@@ -35,6 +35,7 @@ def shared_document(
         "A steering wheel that two turn",
         f"{driver} drives round the circuit with an assist motor on the column: {_SAID[assist.kind]}.",
         (
+            Section("Verdict", (Findings(tuple((f.severity, f.text) for f in verdict(found))),)),
             Section("With and without", (_table(found), _changes(found))),
             Section("A drive", (_drive(shared, alone),)),
         ),

@@ -16,6 +16,7 @@ from math import isfinite, nan, pi
 
 import numpy as np
 
+from codriver.finding import Finding
 from codriver.program import Program
 from codriver.signals.signal import Array
 from codriver.simulate.assist import Assist
@@ -125,6 +126,42 @@ def change_of(with_it: Sequence[Outcome], without: Sequence[Outcome], figure: st
     change = np.array([getattr(a, figure) / getattr(b, figure) - 1 for a, b in zip(with_it, without, strict=True)])
     spread = float(change.std(ddof=1) / np.sqrt(change.size)) if change.size > 1 else nan
     return float(change.mean()), spread
+
+
+def verdict(found: Mapping[str, Sequence[Outcome]]) -> list[Finding]:
+    """What can be said of assists beside no assist, and of a foretold torque beside power steering at the same gain.
+
+    Args:
+        found: by kind of assist, outcomes of the same drives; "none" among them.
+    """
+    said = []
+    for kind, each in found.items():
+        if kind == "none":
+            continue
+        shaking = sum(a.power > b.power for a, b in zip(each, found["none"], strict=True))
+        if shaking:
+            text = (
+                f"{kind}: in {shaking} of {len(each)} drives the driver works more than alone, as when the wheel shakes"
+            )
+            said.append(Finding("bad", f"{text}; take a smaller gain"))
+        for figure, words in (("offset", "off the path"), ("power", "driver's power")):
+            said.append(_compared(f"{kind} against no assist, {words}", each, found["none"], figure))
+    if {"present", "predicted"} <= set(found):
+        for figure, words in (("offset", "off the path"), ("torque", "driver's torque"), ("power", "driver's power")):
+            text = f"predicted against present, {words}"
+            said.append(_compared(text, found["predicted"], found["present"], figure))
+    return said
+
+
+def _compared(text: str, one: Sequence[Outcome], other: Sequence[Outcome], figure: str) -> Finding:
+    """A change in words; it counts where it is larger than two standard errors."""
+    change, error = change_of(one, other, figure)
+    if not isfinite(error):
+        return Finding("warn", f"{text}: {change:+.1%} in one drive, which tells little")
+    severity = "ok" if change < -2 * error else "bad" if change > 2 * error else "warn"
+    return Finding(
+        severity, f"{text}: {change:+.1%} ± {error:.1%}" + (", not told apart" if severity == "warn" else "")
+    )
 
 
 def reversal_rate(angle: Array, dt: float, gap: float = GAP) -> float:

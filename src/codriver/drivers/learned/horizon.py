@@ -25,6 +25,7 @@ from codriver.drivers.learned.learned_driver import fit_table, predicted
 from codriver.drivers.learned.protocol import Fold, Protocol, folds_of
 from codriver.drivers.learned.rollout import NEEDED, WIDE, ColumnAndCar, roll_out, wheel_rates
 from codriver.errors import MissingSignal, UsageError
+from codriver.names import AHEAD
 from codriver.signals import Log
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
@@ -114,6 +115,12 @@ def _ticks(horizons: Sequence[float], setting: FeatureSetting) -> list[int]:
 def _preview(setting: FeatureSetting, ticks: int) -> float:
     """How far a direct model may look, s: as far as an iterated one gets to."""
     steps = ceil(ticks / setting.substeps)
+    farthest = AHEAD * setting.dt - setting.preview + setting.dt
+    if setting.preview > 0 and steps * setting.dt > farthest + 1e-9:
+        raise UsageError(
+            f"a horizon of {ticks * setting.tick:g} s", f"{farthest:g} s at most, for the road is looked at beyond it",
+            "choose a shorter one, or a protocol that looks less far along the road",
+        )  # fmt: skip
     return setting.preview + (steps - 1) * setting.dt if setting.preview > 0 else 0.0
 
 
