@@ -35,8 +35,7 @@ def shared_document(
         "A steering wheel that two turn",
         f"{driver} drives round the circuit with an assist motor on the column: {_SAID[assist.kind]}.",
         (
-            Section("Verdict", (Findings(tuple((f.severity, f.text) for f in verdict(found))),)),
-            Section("With and without", (_table(found), _changes(found))),
+            *_compared(found),
             Section("A drive", (_drive(shared, alone),)),
         ),
         (
@@ -47,6 +46,17 @@ def shared_document(
         ),
         command,
     )  # fmt: skip
+
+
+def _compared(found: Mapping[str, Sequence[Outcome]]) -> tuple[Section, ...]:
+    """Verdict and change, where there is an assist to compare; the table always."""
+    if len(found) < 2:
+        return (Section("Without", (_table(found),)),)
+    said = Findings(tuple((f.severity, f.text) for f in verdict(found)))
+    return (
+        Section("Verdict", (said, "Behind ±: the standard error over the drives, in pairs with the same seed.")),
+        Section("With and without", (_table(found), _changes(found))),
+    )
 
 
 def _table(found: Mapping[str, Sequence[Outcome]]) -> Table:

@@ -44,7 +44,7 @@ class Outcome:
 
     Attributes:
         offset, largest: rms and largest distance off the path, m.
-        heading: rms of the heading error less minus the sideslip that it has on the path, rad.
+        heading: rms of the course's error, psi + beta, rad.
         torque: rms, N m; squared: mean of its square, N^2 m^2; power: mean of the driver's mechanical power's size, W.
         assist: rms of the motor's torque, N m.
         opposed_share, opposed: of the time, and mean torque, N m.
