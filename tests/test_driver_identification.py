@@ -61,7 +61,7 @@ class TestClean:
         assert fit.explained > 0.999
         assert fit.rms == pytest.approx(0.02, rel=0.1)  # of the torque sensor
         assert fit.driver().anticipation == fit.parameters["anticipation"].value
-        assert np.std(fit.record.torque - fit.torque()) < 0.05
+        assert np.std(fit.records[0].torque - fit.torque()) < 0.05
 
     @pytest.mark.slow
     @pytest.mark.parametrize("name", CIRCUIT_DRIVERS)
@@ -77,7 +77,7 @@ class TestClean:
         # Offset and heading error summed from yaw rate and sideslip, behind a high-pass.
         truth = CIRCUIT_DRIVERS["carla"]
         fit = identify_driver(without(clean, "lateral_offset", "heading_error"), start(truth), by="direct")
-        assert fit.record.summed
+        assert fit.records[0].summed
         for name, within in (("anticipation", 0.01), ("compensation", 0.05), ("reflex", 0.03)):
             assert fit.parameters[name].value == pytest.approx(getattr(truth, name), rel=within)
 
@@ -204,9 +204,9 @@ class TestParts:
         from scipy.signal import lfilter
 
         v = lfilter([1.0], [1.0, -1.5, 0.7], rng.standard_normal(50_000))
-        a = whitening(v)
+        a = whitening([v])
         assert np.allclose(a[:4], [1, -1.5, 0.7, 0], atol=0.02)
-        e = whitened(a, v)
+        e = whitened(a, [v])
         assert e.std() == pytest.approx(1, rel=0.02)
         assert abs(np.corrcoef(e[1:], e[:-1])[0, 1]) < 0.02
 

@@ -60,6 +60,7 @@ class DualFit:
         names: of the parameters.
         time: s from the record's start, shape (n,).
         values, sd: of each parameter over time, SI, shape (n, p).
+        covariance: of the logarithms at the end, shape (p, p).
         errors: e, N m, shape (n,).
     """
 
@@ -67,7 +68,13 @@ class DualFit:
     time: Array = field(repr=False)
     values: Array = field(repr=False)
     sd: Array = field(repr=False)
+    covariance: Array = field(repr=False)
     errors: Array = field(repr=False)
+
+    @property
+    def tick(self) -> float:
+        """s."""
+        return float(self.time[1] - self.time[0])
 
     def last(self) -> dict[str, tuple[float, float]]:
         """Value and standard deviation at the end."""
@@ -108,10 +115,12 @@ def dual_ekf(
     ran = step.mapaccum("run", n, 1, {"base": 16})(start, given)
     kept = np.array(ca.DM(ran[1])).T
     theta, variance, errors = kept[:, :p], kept[:, p : 2 * p], kept[:, -1]
-    values = np.exp(theta)
+    values, end = np.exp(theta), np.array(ca.DM(ran[0]))[:, -1]
+    first = _STATES + _STATES**2 + p
     return DualFit(
-        names, dt * np.arange(1, n + 1) + record.first * record.dt, values, values * np.sqrt(variance), errors
-    )
+        names, dt * np.arange(1, n + 1) + record.first * record.dt, values, values * np.sqrt(variance),
+        end[first : first + p * p].reshape(p, p), errors,
+    )  # fmt: skip
 
 
 def _step(
