@@ -19,7 +19,7 @@ Measured on the circuit, 8 laps, 5 drivers, 3 seeds each, known = the default dr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from codriver.signals.signal import Array
 ASKED = ("anticipation", "compensation", "lead", "lag", "delay", "reflex", "muscle")
 SEEN = ("near", "far")  # where he looks: given, never sought
 WAYS = ("road", "direct", "dual-ekf")
+TWO_SPEEDS = 1.1  # ratio
 SPREAD = 0.5
 TOLD = 0.6
 STRANGE, SHARP = 2.0, 0.2  # spreads from what was known, with this share of doubt left
@@ -50,7 +51,8 @@ def identify_driver(
     drives: Log | Sequence[Log],
     known: TwoPointDriver | None = None,
     *,
-    asked: Sequence[str] = ASKED,
+    asked: Sequence[str] | None = None,
+    held: Collection[str] = (),
     by: str = "road",
     spread: float = SPREAD,
 ) -> DriverFit:
@@ -60,7 +62,8 @@ def identify_driver(
         drives: one or several, each at one speed, see `driver_record`.
         known: where the two points are, the parameters that are not asked for, and what is known of the others. K_r is among the
             former: K_p and K_c are those for this K_r.
-        asked: names of the parameters to identify.
+        asked: names of the parameters to identify; None for all of ASKED, and K_r where the drives' speeds differ by a tenth.
+        held: names of the parameters that None leaves out, since they are known.
         by: "road", "direct" or "dual-ekf"; the last takes one drive.
         spread: standard deviation of the logarithms of the parameters asked for about those known.
 
@@ -76,7 +79,7 @@ def identify_driver(
             f"by '{by}', spread {spread:g}", f"one of {', '.join(WAYS)}, and a positive spread", "choose one"
         )
     seekable = [n for n in LETTERS if n not in SEEN]
-    if not asked or len(set(asked)) < len(asked) or any(n not in seekable for n in asked):
+    if asked is not None and (not asked or len(set(asked)) < len(asked) or any(n not in seekable for n in asked)):
         raise UsageError(
             f"asked for {', '.join(asked) or 'nothing'}", f"some of {', '.join(seekable)}, each once", "choose among these"
         )  # fmt: skip
@@ -85,6 +88,10 @@ def identify_driver(
     records = tuple(driver_record(log, known.near, known.far) for log in logs)
     for record in records:
         _refuse_rest(record)
+    if asked is None:
+        asked = [n for n in (*ASKED, *_at_two_speeds(records)) if n not in held]
+        if not asked:
+            raise UsageError("every parameter is held", f"some of {', '.join(ASKED)} to be sought", "hold fewer")
     hidden = _hidden(records, known, tuple(asked))
     names = tuple(n for n in asked if n not in hidden)
     end, path = None, None
@@ -120,6 +127,12 @@ def _by_filter(
     settled = bool((np.ptp(late, axis=0) < np.sqrt(variance)).all())
     pieces = np.array([0, path.errors.size])
     return Found(np.log(path.values[-1]), settled, path.covariance, path.covariance, path.errors, pieces), path
+
+
+def _at_two_speeds(records: Sequence[DriverRecord]) -> tuple[str, ...]:
+    """What only drives at two speeds tell."""
+    speeds = [r.speed for r in records]
+    return ("column_gain",) if max(speeds) > TWO_SPEEDS * min(speeds) else ()
 
 
 def _logarithms(known: TwoPointDriver, names: tuple[str, ...]) -> Array:

@@ -3,6 +3,7 @@
 drive.csv       what the simulator logs: wheel angle, torque, and what its vehicle model and scene know
 names.toml      what the columns mean
 truth.parquet   the driver's torque, the wheel's angle and rate, and where the two points were
+truth.toml      the driver: his parameters, about which his gains drift if he varies
 """
 
 from __future__ import annotations
@@ -14,12 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from codriver.logs.write import Column, write_table
+from codriver.models.two_point_file import FiledDriver, save_two_point
 from codriver.signals import Log
 from codriver.signals.signal import Array
 from codriver.simulate.circuit import CircuitDrive, CircuitSetting, simulate_circuit
 from codriver.simulate.folder import refuse_foreign, write_folder
 
-FILES = ("drive.csv", "names.toml", "truth.parquet")
+FILES = ("drive.csv", "names.toml", "truth.parquet", "truth.toml")
 _DEGREE = 180 / pi
 # Standard name, column, unit in the file, factor from SI, digits.
 _COLUMNS = (
@@ -38,6 +40,7 @@ class CircuitFiles:
     drive: Path
     names: Path
     truth: Path
+    driver: Path
 
 
 def write_circuit(
@@ -68,6 +71,8 @@ def _write(drive: CircuitDrive, folder: Path) -> None:
     files.names.write_text(f"# The log of a drive round the simulated circuit.\n{names}", encoding="utf-8")
     truth = drive.truth()
     columns = [Column(signal.name, signal.values, signal.unit) for signal in truth.values()]
+    filed = FiledDriver.of(drive.setting.driver, "truth", f"drove the circuit, seed {drive.seed}")
+    save_two_point(filed, files.driver)
     write_table(files.truth, drive.time, columns, {"source": truth.source, "seed": str(drive.seed)})
 
 
