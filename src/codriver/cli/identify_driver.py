@@ -19,9 +19,12 @@ if TYPE_CHECKING:
     from codriver.report.document import Document
 
 Drives = Annotated[
-    list[Path], typer.Argument(metavar="DRIVE...", help="Recordings of one driver, each at one speed.", show_default=False)
+    list[Path],
+    typer.Argument(metavar="DRIVE...", help="Recordings of one driver, each at one speed.", show_default=False),
 ]
-Out = Annotated[Path, typer.Option("-o", "--out", metavar="NAME.toml", help="Driver file to write.", show_default=False)]
+Out = Annotated[
+    Path, typer.Option("-o", "--out", metavar="NAME.toml", help="Driver file to write.", show_default=False)
+]
 Known = Annotated[
     str, typer.Option("--known", metavar="NAME=VALUE,...",
                       help='Parameters that are not sought, SI: "K_r=0.15, far=1.2". Default: K_r, near, far of the usual driver.'),
@@ -41,9 +44,9 @@ def driver(
     drives: Drives, out: Out, known: Known = "", by: By = "road", beside: Beside = None, dbc: Dbc = None, names: Names = None,
     bus: Bus = None, vehicle: VehicleName = None, report: Report = None, overwrite: Overwrite = False, json: Json = False,
 ) -> None:  # fmt: skip
-    """Gains, times and arms of the two-point driver who drove, with standard errors, from drives on a known road (2019, section 5.3).
+    """Gains, times and arms of a two-point driver, with standard errors, from drives on a known road (2019, section 5.3).
 
-    The file drives again: codriver simulate circuit --driver NAME.toml. Where no sensor measures the driver's torque, give --vehicle.
+    The file drives again: codriver simulate circuit --driver NAME.toml. Where no sensor measures the torque, give --vehicle.
 
     Example: codriver identify driver laps/drive.csv --names laps/names.toml -o anna.toml --report anna.html
     """
@@ -74,8 +77,8 @@ def driver(
     told: dict[str, Any] = {
         "drives": [str(path) for path in drives], "by": by, "notes": notes,
         "parameters": {
-            p.name: {"letter": p.letter, "value": p.value, "se": p.sd, "se_model": p.sd_model, "se_robust": p.sd_robust, "low": p.low,
-                     "high": p.high, "unit": p.unit}
+            p.name: {"letter": p.letter, "value": p.value, "unit": p.unit, "se": p.sd, "se_model": p.sd_model,
+                     "se_robust": p.sd_robust, "low": p.low, "high": p.high}
             for p in fit.parameters.values()
         },
         "given": dict(fit.given), "refused": {r.name: r.reason for r in fit.refused},

@@ -15,7 +15,10 @@ Driver = Annotated[
     str, typer.Option("--driver", help="anna, ben, carla, david, emma, or a file of codriver identify driver (TOML).")
 ]
 Given = Annotated[
-    str, typer.Option("--given", metavar="NAMES", help="Parameters that a driver file does not tell: take what was given for them."),
+    str,
+    typer.Option(
+        "--given", metavar="NAMES", help="Of a driver file: parameters it does not tell, taken as they were given."
+    ),
 ]
 Varied = Annotated[
     bool, typer.Option("--variability/--no-variability", help="A driver whose gains drift and who is noisy.")

@@ -122,7 +122,9 @@ def _by_filter(
     path = dual_ekf(record, known, names, DualTuning(spread=spread))
     variance = path.covariance.diagonal()
     if not (np.isfinite(path.values).all() and (variance > 0).all()):
-        raise LogError(f"{record.source}: the dual filter diverges", "a filter that stays finite", "identify by the road")
+        raise LogError(
+            f"{record.source}: the dual filter diverges", "a filter that stays finite", "identify by the road"
+        )
     late = np.log(path.values[-path.time.size // 5 :])
     settled = bool((np.ptp(late, axis=0) < np.sqrt(variance)).all())
     pieces = np.array([0, path.errors.size])

@@ -1,6 +1,6 @@
 """What a driver's torque leaves unexplained, as a function of the logarithms of his parameters, and its whitening.
 
-v(theta) = T_dr - T(theta; what he saw),    low-passed and thinned to RATE Hz, less its mean in each drive (a constant torque is bias)
+v(theta) = T_dr - T(theta; what he saw),    low-passed and thinned to RATE Hz, less its mean in each drive (bias)
 e_k = v_k - a_1 v_{k-1} - ... - a_p v_{k-p}                                        a by Yule and Walker
 """
 

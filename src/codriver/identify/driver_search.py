@@ -20,8 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from codriver.identify.driver_residual import Residual, jacobian, whitened, whitening
-from codriver.identify.standard_errors import block_length, newey_west
-from codriver.identify.standard_errors import Index
+from codriver.identify.standard_errors import Index, block_length, newey_west
 from codriver.signals.signal import Array
 
 _ROUNDS, _STEPS, _TRIES = 20, 6, 8
@@ -62,7 +61,11 @@ def search(residual: Residual, instrument: Residual, start: Array, spread: float
     for _ in range(_ROUNDS):
         filter_ = whitening(residual(theta))
         v = residual(theta)
-        Z, e, pieces = whitened(filter_, jacobian(instrument, theta)), whitened(filter_, v), _pieces(v, filter_.size - 1)
+        Z, e, pieces = (
+            whitened(filter_, jacobian(instrument, theta)),
+            whitened(filter_, v),
+            _pieces(v, filter_.size - 1),
+        )
         before, theta = theta, _round(residual, filter_, Z, _meat(Z, e, pieces), theta, start, spread)
         plain, robust, errors = _covariances(residual, instrument, theta, spread)
         settled = bool((np.abs(theta - before) < _SETTLED * np.sqrt(robust.diagonal())).all())

@@ -36,7 +36,7 @@ def error_correlation(fit: DriverFit) -> tuple[Array, Array, float]:
     e = fit.found.errors
     most = round(LAGS / fit.tick)
     rho = autocorrelation(e, np.ones(e.size, bool), fit.found.pieces, most)
-    return fit.tick * np.arange(1, most + 1), rho[1:], 1.96 / float(np.sqrt(e.size))
+    return fit.tick * np.arange(1.0, most + 1), rho[1:], 1.96 / float(np.sqrt(e.size))
 
 
 def lasting(fit: DriverFit) -> float:
@@ -53,12 +53,16 @@ def driver_findings(fit: DriverFit) -> tuple[Finding, ...]:
     if not fit.settled:
         found.append(Finding("warn", f"{_unsettled(fit)}: do not trust the values, record more"))
     if fit.by == "dual-ekf":
-        found.append(Finding("warn", "standard errors are the dual filter's own: they hold what its tuning assumes, and a driver who "
-                                     "varies biases it; compare with --by road"))  # fmt: skip
+        said = "standard errors are the dual filter's own: they hold what its tuning assumes, and a driver who varies biases it"
+        found.append(Finding("warn", f"{said}; compare with the way by the road"))
     else:
-        found += [_variation(fit), _white(fit)]
+        found.append(_variation(fit))
+    found.append(_white(fit))
     found += [
-        Finding("warn", f"the torque is no sensor's ({source}): the estimate's lag is in tau_p and T_N, its smoothness in K_t")
+        Finding(
+            "warn",
+            f"the torque is no sensor's ({source}): the estimate's lag is in tau_p and T_N, its smoothness in K_t",
+        )
         for source in sorted(set(fit.estimated))
     ]
     if any(r.summed for r in fit.records):
@@ -92,8 +96,13 @@ def _variation(fit: DriverFit) -> Finding:
     if alike < LASTING:
         return Finding("ok", f"{left}, new at each tick: noise, and a driver who is always the same")
     if fit.by == "direct":
-        return Finding("warn", f"{left} and last: he varies, which biases prediction errors; say --by road")
-    return Finding("ok", f"{left} and last: he varies; what the road makes of his torque is fitted, not his noise")
+        return Finding(
+            "warn",
+            f"{left}, and last: he varies, which biases prediction errors, or what is given is not his; try by road",
+        )
+    return Finding(
+        "ok", f"{left}, and last: he varies (what the road makes of his torque is fitted), or what is given is not his"
+    )
 
 
 def _white(fit: DriverFit) -> Finding:
@@ -102,4 +111,7 @@ def _white(fit: DriverFit) -> Finding:
     said = f"errors one tick ahead: {beyond:.0%} of the autocorrelations up to {lags[-1]:g} s beyond the bounds of white noise"
     if beyond <= WHITE:
         return Finding("ok", said)
-    return Finding("warn", f"{said}; the standard errors hold that (Newey-West)")
+    held = (
+        "the standard errors do not hold that" if fit.by == "dual-ekf" else "the standard errors hold that (Newey-West)"
+    )
+    return Finding("warn", f"{said}; {held}")

@@ -12,8 +12,8 @@
     unit = "N*m/rad"
     source = "not told: this drive hardly tells it"
 
-A parameter that a drive did not tell has no value, only the one that was given before the drive; who drives with such a file says by
-name which of these he takes. Read strictly, as vehicle files are.
+A parameter that a drive did not tell has no value, only the one that was given before the drive; who drives with such a file says
+by name which of these he takes. Read strictly, as vehicle files are.
 """
 
 from __future__ import annotations

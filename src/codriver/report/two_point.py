@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from codriver.identify.driver_fit import TOLD
 from codriver.identify.driver_result import WORDS, DriverFit
 from codriver.identify.driver_verdict import driver_findings, error_correlation
+from codriver.identify.standard_errors import Index
 from codriver.models.two_point_file import LETTERS, FiledDriver
 from codriver.report.document import GREY, Chart, Curve, Document, Findings, Mark, Part, Plot, Section, Table
+from codriver.signals.signal import Array
 
 HEAD = ("parameter", "", "unit", "value", "se", "95 % interval", "told")
 MOST_POINTS = 4000
@@ -28,7 +31,7 @@ def two_point_rows(fit: DriverFit, beside: FiledDriver | None = None) -> list[tu
             row = (f"{fit.given[name]:.4g}", "-", "-", "given")
         else:
             row = ("-", "-", "-", "no")
-        rows.append((name, letter, unit, *row))
+        rows.append((name, "" if letter == name else letter, unit, *row))
         if beside is None:
             continue
         other = beside.parameters[name].value
@@ -59,7 +62,7 @@ def two_point_document(fit: DriverFit, beside: FiledDriver | None = None, comman
         result.append(_bars(fit, beside))
     sections = [
         Section("Result", tuple(result)),
-        Section("Measured and modelled torque", tuple(_torque(fit, d) for d in range(len(fit.records)))),
+        Section("Measured and modelled torque", tuple(c for d in range(len(fit.records)) for c in _torque(fit, d))),
     ]
     if fit.path is not None:
         sections.append(Section("Parameters over time, by dual EKF", (_path(fit, beside),)))
@@ -88,24 +91,19 @@ def _bars(fit: DriverFit, beside: FiledDriver | None) -> Chart:
     value = np.exp(fit.found.theta)
     sd = np.sqrt(np.maximum(fit.found.plain.diagonal(), fit.found.robust.diagonal()))
     low, high = value * np.exp(-1.96 * sd), value * np.exp(1.96 * sd)
-    told = np.array([n in fit.parameters for n in fit.names])
-    letters = [LETTERS[n][0] for n in fit.names]
-    curves = [
-        Curve(name, letters, *(np.where(use, x / before, np.nan) for x in (value,)), color, "bars",
-              low=np.where(use, low / before, np.nan), high=np.where(use, high / before, np.nan))
-        for name, use, color in (("told", told, BLUE), ("not told", ~told, "#BDBDBD")) if use.any()
-    ]  # fmt: skip
+    labels = [LETTERS[n][0] + ("" if n in fit.parameters else ", not told") for n in fit.names]
+    curves = [Curve("found", labels, value / before, "#8FB8D4", "bars", low=low / before, high=high / before)]
     if beside is not None:
         other = np.array([beside.parameters[n].value or np.nan for n in fit.names])
-        curves.append(Curve(beside.name, letters, other / before, RED, "points", width=9))
+        curves.append(Curve(beside.name, labels, other / before, RED, "points", width=9))
     return Chart(
         "Values with 95 % intervals, over what was known before the drive", "",
         (Plot("over the value given before", tuple(curves), 260, (1.0,)),),
-        "Grey: not told, the doubt left is more than six tenths of that before the drive.",
+        f"Not told: the doubt left is more than {TOLD:g} of that before the drive, or the value is far from all that was known.",
     )  # fmt: skip
 
 
-def _torque(fit: DriverFit, drive: int) -> Chart:
+def _torque(fit: DriverFit, drive: int) -> tuple[Chart, Chart]:
     """Measured torque, the model's, and the rest, over a drive; and the first stretch of it in detail."""
     r, made = fit.records[drive], fit.torque(drive)
     rows = np.arange(r.first, r.last)
@@ -113,20 +111,28 @@ def _torque(fit: DriverFit, drive: int) -> Chart:
     part = np.arange(r.first, min(r.first + round(SHOWN / r.dt), r.last))
     part = part[:: max(part.size // MOST_POINTS, 1)]
     offset = float((r.torque - made)[r.first : r.last].mean())
-    return Chart(
-        Path(r.source).name or f"drive {drive + 1}", "time (s)",
+    title = Path(r.source).name or f"drive {drive + 1}"
+
+    def both(use: Index) -> tuple[Curve, Curve]:
+        return (
+            Curve("measured", _seconds(r.dt, use), r.torque[use], GREY, width=2.5),
+            Curve("model", _seconds(r.dt, use), made[use] + offset, RED),
+        )
+
+    whole = Chart(
+        title, "time (s)",
         (
-            Plot("torque (N m)", (
-                Curve("measured", r.dt * rows, r.torque[rows], GREY, width=2.5), Curve("model", r.dt * rows, made[rows] + offset, RED),
-            ), 240),
-            Plot(f"the first {SHOWN:g} s", (
-                Curve("", r.dt * part, r.torque[part], GREY, width=2.5), Curve("", r.dt * part, made[part] + offset, RED),
-            ), 200),
-            Plot("measured - model (N m)", (Curve("", r.dt * rows, (r.torque - made)[rows] - offset, BLUE),), 160, (0.0,)),
+            Plot("torque (N m)", both(rows), 240),
+            Plot("measured - model (N m)", (Curve("", _seconds(r.dt, rows), (r.torque - made)[rows] - offset, BLUE),), 160, (0.0,)),
         ),
         f"The model's torque comes from what the driver saw and the wheel's angle, without any measured torque; a constant of "
         f"{offset:+.3f} N m is added.",
     )  # fmt: skip
+    return whole, Chart(f"{title}, its first {SHOWN:g} s", "time (s)", (Plot("torque (N m)", both(part), 240),))
+
+
+def _seconds(dt: float, rows: Index) -> Array:
+    return np.asarray(dt * rows, float)
 
 
 def _path(fit: DriverFit, beside: FiledDriver | None) -> Chart:
@@ -161,7 +167,7 @@ def _errors(fit: DriverFit) -> Chart:
     step = max(e.size // MOST_POINTS, 1)
     return Chart(
         "Errors one tick ahead", "time over all drives (s)",
-        (Plot("error (N m)", (Curve("", fit.tick * np.arange(e.size)[::step], e[::step], GREEN, "points", width=3, faint=True),),
+        (Plot("error (N m)", (Curve("", fit.tick * np.arange(0.0, e.size, step), e[::step], GREEN, "points", width=3, faint=True),),
               200, (0.0,)),),
         f"{fit.one_step:.3g} N m rms, ticks of {1000 * fit.tick:.0f} ms.", half=True,
     )  # fmt: skip
