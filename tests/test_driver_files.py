@@ -157,7 +157,11 @@ class TestFromFilesToADrive:
 
     def test_refusals(self, laps, tmp_path):
         words = ("identify", "driver", laps / "drive.csv", "--names", laps / "names.toml", "-o", tmp_path / "x.toml")
-        for more, said in ((("--by", "magic"), "magic"), (("--known", "K_q=1"), "K_q"), (("--beside", "no.toml"), "no.toml")):
+        for more, said in (
+            (("--by", "magic"), "magic"),
+            (("--known", "K_q=1"), "K_q"),
+            (("--beside", "no.toml"), "no.toml"),
+        ):
             assert said in refused(*words, *more).found
         # No file but a driver's is replaced.
         other = tmp_path / "other.toml"
