@@ -69,7 +69,9 @@ def driver_findings(fit: DriverFit) -> tuple[Finding, ...]:
         found.append(Finding("warn", "offset and heading error are summed from yaw rate and sideslip, behind a high-pass: slow "
                                      "corrections do not count"))  # fmt: skip
     given = ", ".join(f"{LETTERS[n][0]} {x:g} {LETTERS[n][1]}".removesuffix(" 1") for n, x in fit.given.items())
-    found.append(Finding("ok", f"taken as given: {given}; the values are those for these"))
+    found.append(
+        Finding("ok", f"taken as given: {given}; the standard errors hold no doubt about these (docs/two-point.md)")
+    )
     return tuple(found)
 
 

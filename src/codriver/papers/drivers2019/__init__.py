@@ -44,8 +44,8 @@ def reproduce(tell: Tell, quick: bool, recordings: Path | None) -> Reproduction:
         drives = [drive(seed) for seed in range(1, seeds[scene] + 1)]
         both = []
         for protocol, logs in ((BY_PI, [observed(d) for d in drives]), (HONEST, [d.log() for d in drives])):
-            tell(f"{scene}, {protocol.name}")
-            both.append(judge(logs, methods, protocol, sparse=quick))
+            under = _under(f"{scene}, {protocol.name}", tell)
+            both.append(judge(logs, methods, protocol, sparse=quick, tell=under))
         found[scene] = both[0], both[1]
     tell("what the leak is worth")
     leak = leak_chapter(found["figure 14"], seeds["figure 14"])
@@ -65,6 +65,10 @@ def reproduce(tell: Tell, quick: bool, recordings: Path | None) -> Reproduction:
         (("drives of figures 12, 14, 16", ", ".join(str(n) for n in seeds.values())), ("rows a second", "5"),
          ("Gaussian process", "sparse" if quick else "on all rows")),
     )  # fmt: skip
+
+
+def _under(head: str, tell: Tell) -> Tell:
+    return lambda text: tell(f"{head}: {text}")
 
 
 def _figure_chapter(scene: str, found: Found) -> Chapter:

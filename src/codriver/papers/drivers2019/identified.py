@@ -29,9 +29,7 @@ from codriver.simulate.circuit import CircuitDrive, CircuitSetting, simulate_cir
 TITLE = "A driver identified from the human (5.3, figure 15)"
 TRUTH = TwoPointDriver()
 # A fifth to a half off the truth.
-START = TwoPointDriver(
-    anticipation=3.6, compensation=12.0, lead=0.9, lag=0.5, delay=0.16, reflex=4.5, muscle=0.14
-)
+START = TwoPointDriver(anticipation=3.6, compensation=12.0, lead=0.9, lag=0.5, delay=0.16, reflex=4.5, muscle=0.14)
 JUDGED = ("gmr-21", "hmm-21", "ann")  # of figure 16, by the identified driver
 COVERED = 0.8  # share of 95 % intervals that hold the truth, for "identified"
 MOST_POINTS = 4000
@@ -89,9 +87,9 @@ def figure_15_chapter(found: Identified, seeds: Sequence[int], varied: tuple[Jud
     """
     items = (*_of_paper(found), *_of_figure_16(found, varied), *_beside(found, seeds))
     words = (
-        "The paper smooths the human's data, identifies a sensorimotor two-point driver by the dual EKF of Wan and Nelson, and lets "
-        "him drive; it prints no parameters. Here a dual EKF gets the PI observer's torque of the driver of figure 14, unsmoothed, and "
-        "starts from a driver a fifth to a half off. K_r and where he looks are given. Beside it: by the road, the library's default "
+        "The paper smooths the human's data, identifies a sensorimotor two-point driver by a dual EKF, and lets him drive; it "
+        "prints no parameters. Here a dual EKF gets the PI observer's torque of the driver of figure 14, unsmoothed, and starts "
+        "from a driver a fifth to a half off. K_r and where he looks are given. Beside it: by the road, the library's default "
         "(docs/two-point.md), on the measured torque.",
     )
     return Chapter(TITLE, words, (_torques(found, seeds), _table(found), _paths(found)), items)
@@ -140,7 +138,7 @@ def _of_figure_16(found: Identified, varied: tuple[Judged, Judged]) -> tuple[Ite
         items.append(Item(
             f"fig. 16 by the identified driver, {human_driver.protocol.name}: GMR and HMM-GMR much better than with the human",
             "significant", f"GMR {gain['gmr-21']:.2f}, HMM-GMR {gain['hmm-21']:.2f} times", "", max(gain.values()) <= 0.8,
-            "as in the next chapter, where the true driver drives; each as a fraction of PWC, over figure 14's; at most 0.8 counts. "
+            "the next chapter has the true driver in his place. Each as a fraction of PWC, over figure 14's; at most 0.8 counts. "
             f"GMR {still.ratio('gmr-21', 'ann'):.2f}, HMM-GMR {still.ratio('hmm-21', 'ann'):.2f} of ANN",
         ))  # fmt: skip
     return tuple(items)
@@ -155,8 +153,8 @@ def _beside(found: Identified, seeds: Sequence[int]) -> tuple[Item, ...]:
     return (
         Item("fig. 15: the identified driver's torque is like the human's", None,
              f"{mine:.3f} of its rms off, the true driver {true:.3f}", "", mine <= 1.5 * true,
-             "not in the paper, whose figure 15 shows the torque alone; rms of the difference to the human's true torque, both without "
-             "variation; at most 1.5 times counts. So a torque that looks right does not tell that the parameters are"),
+             "not in the paper, whose figure 15 shows the torque alone; rms of the difference to the human's true torque, both "
+             "without variation; at most 1.5 times counts. So a torque that looks right does not tell that the parameters are"),
         Item("dual EKF, a driver who does not vary: intervals hold the truth", None, f"{same} of {of_same}", "",
              same >= COVERED * of_same, f"not in the paper; measured torque. {worst_same}"),
         Item("dual EKF without the recurrent derivative (remark 4) cannot identify", None, found.without, "1",
@@ -181,7 +179,7 @@ def _differences(found: Identified, seeds: Sequence[int]) -> tuple[float, float]
             np.sum((drive.driver_torque - torque) ** 2), np.sum((regenerated(seed).driver_torque - torque) ** 2),
             np.sum(torque**2),
         ]  # fmt: skip
-    mine, true = np.sqrt(sums[:2] / sums[2])
+    mine, true = np.sqrt(sums[:2] / sums[2]) if sums[2] > 0 else (np.nan, np.nan)
     return float(mine), float(true)
 
 
@@ -206,15 +204,15 @@ def _paths(found: Identified) -> Chart:
     plots = []
     shown = (("varies", found.dual[0], BLUE), ("does not vary", found.still, "#007A5A"))
     for k, name in enumerate(found.dual[0].names):
-        curves = []
+        curves, ends = [], np.zeros(2)
         for label, fit, color in shown:
             assert fit.path is not None
             use = slice(None, None, max(fit.path.time.size // MOST_POINTS, 1))
-            value, sd = fit.path.values[use, k], fit.path.sd[use, k]
+            time, value, sd = fit.path.time[use], fit.path.values[use, k], fit.path.sd[use, k]
             curves.append(
-                Curve(f"{label}, one sd" if k == 0 else "", fit.path.time[use], value, color, low=value - sd, high=value + sd)
+                Curve(f"{label}, one sd" if k == 0 else "", time, value, color, low=value - sd, high=value + sd)
             )
-        ends = np.array([0.0, float(fit.path.time[-1])])
+            ends = time[[0, -1]]
         curves.append(Curve("truth" if k == 0 else "", ends, np.full(2, getattr(TRUTH, name)), BLACK, dash="dot"))
         letter, unit = LETTERS[name]
         plots.append(Plot(f"{letter} ({unit})" if unit != "1" else letter, tuple(curves), 110))
@@ -236,8 +234,8 @@ def _table(found: Identified) -> Table:
         ("parameter", "truth", "start", "varies: dual EKF, PI torque", "varies: by the road", "does not: dual EKF",
          "does not: by the road"),
         rows,
-        "Value ± standard error, one drive. In brackets: the library refuses to tell it, since the drive leaves too much doubt or the "
-        "value is far from all that was known.",
+        "Value ± standard error, one drive. In brackets: the library refuses to tell it, since the drive leaves too much doubt or "
+        "the value is far from all that was known.",
     )  # fmt: skip
 
 
