@@ -79,7 +79,9 @@ def run(quick: bool) -> Iterator[Row]:
         scaled = taken.best * (y.size / (part.stop - part.start)) ** other.power
         how = "" if part.stop == y.size else f"; it learnt {part.stop} rows, scaled by n^{other.power:g}"
         if other.predict is None:
-            yield _row(what[0], learnt.best, other.name, scaled, goals[0], f"error on another drive {mine:.3f} sd{_size(ours)}")
+            yield _row(
+                what[0], learnt.best, other.name, scaled, goals[0], f"error on another drive {mine:.3f} sd{_size(ours)}"
+            )
             yield Row(what[1], duration(made.best), **_met(made.best, goals[1]), note=f"{other.name} has no regression")
             continue
         its = _rmse(other.predict(found[0], other_X[: other.few]), other_y[: other.few])
@@ -177,8 +179,10 @@ class Network:
 
         cut = y.size - y.size // 10
         made = [
-            MLPRegressor(hidden_layer_sizes=(2,), activation="tanh", solver="lbfgs", max_iter=500, random_state=k)
-            .fit(X[:cut], y[:cut]) for k in range(5)
+            MLPRegressor(hidden_layer_sizes=(2,), activation="tanh", solver="lbfgs", max_iter=500, random_state=k).fit(
+                X[:cut], y[:cut]
+            )
+            for k in range(5)
         ]
         self.best = min(made, key=lambda m: _rmse(m.predict(X[cut:]), y[cut:]))
         return self
