@@ -51,7 +51,7 @@ def rides(machine: Machine) -> dict[str, Ride]:
         "lane change": ride(
             Rider(machine, double_lane_change(3.5, 70.0, 40.0), ramp(100 * KMH, 100 * KMH, 0.0, 1.0)), 9.0
         ),
-        "turn": ride(Rider(machine, lambda _x: 0.0, steady, lean=lambda t: 0.55 if t > 1 else 0.0), 10.0),
+        "turn": ride(Rider(machine, slalom(0.0, 100.0), steady, lean=lambda t: 0.55 if t > 1 else 0.0), 10.0),
     }
 
 
