@@ -145,17 +145,18 @@ class TestRide:
         assert rms(errors(found, done, "roll_angle", 0.5)) < 1.5 * DEGREE
 
     def test_rows_that_are_missing(self, program):
-        """Without pitch rate and vertical acceleration, half the steer angles and a tenth of the speeds."""
+        """Without pitch rate and vertical acceleration, steer at 50 Hz and speed at 10 Hz, never on the same tick."""
         done = leaning_ride()
         full = ride_log(done, noisy(done))
-        keep = {"steer_angle": 10, "longitudinal_speed": 50}
+        pick = {"steer_angle": slice(3, None, 20), "longitudinal_speed": slice(7, None, 100)}
         signals = [
-            cd.Signal(name, s.time[:: keep.get(name, 1)], s.values[:: keep.get(name, 1)], s.unit)
+            cd.Signal(name, s.time[pick.get(name, slice(None))], s.values[pick.get(name, slice(None))], s.unit)
             for name, s in full.items()
             if name not in ("pitch_rate", "vertical_acceleration")
         ]
         found = program.run(cd.Log.of(signals))
-        assert rms(errors(found, done, "roll_angle")) < 1.2 * DEGREE
+        assert rms(errors(found, done, "roll_angle")) < 1.5 * DEGREE
+        assert found.valid[100:].all()
         assert (found.columns["pitch_rate_innovation"] == 0).all()
 
     def test_an_outage_is_told_and_survived(self, program):
