@@ -11,10 +11,15 @@ import pytest
 import codriver as cd
 from codriver.models import MotorcycleParameters
 from codriver.models.motorcycle import motorcycle_model
-from codriver.simulate.motorcycle import FRONT_TYRE, STATES, Machine, MachineParameters, TyreParameters
+from codriver.simulate.motorcycle import FRONT_TYRE, INPUTS, STATES, Machine, MachineParameters, TyreParameters
 from codriver.simulate.motorcycle.tyre import steady_forces
 
-NOTHING = np.zeros(4)
+NOTHING = np.zeros(len(INPUTS))
+
+
+def put(state: np.ndarray, **values: float) -> None:
+    for name, value in values.items():
+        state[STATES.index(name)] = value
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +38,8 @@ class TestConserved:
     def test_flying_keeps_energy_and_angular_momentum(self, sharp):
         machine = Machine(MachineParameters(replace(sharp, K=0.0)), road=False, grip=False)
         state = machine.upright(20.0)
-        state[4:7] = 0.6, 0.2, 0.3
-        state[8:14] = 1.0, 0.5, 0.3, 0.9, -0.4, 0.5
+        put(state, roll=0.6, pitch=0.2, steer=0.3, y_rate=1.0, z_rate=0.5, yaw_rate=0.3)
+        put(state, roll_rate=0.9, pitch_rate=-0.4, steer_rate=0.5)
         before = machine.conserved(state)
         first = state
         for _ in range(1000):
@@ -45,7 +50,7 @@ class TestConserved:
     def test_fall_of_the_mass_centre(self, sharp):
         machine = Machine(MachineParameters(replace(sharp, K=0.0)), road=False, grip=False)
         state = machine.upright(0.0)
-        assert machine.rate(state, NOTHING)[9] == pytest.approx(-sharp.g, rel=1e-9)
+        assert machine.rate(state, NOTHING)[STATES.index("z_rate")] == pytest.approx(-sharp.g, rel=1e-9)
 
     def test_ice_keeps_energy(self, sharp):
         stiff = replace(FRONT_TYRE, radial_damping=0.0)
@@ -53,7 +58,7 @@ class TestConserved:
             MachineParameters(replace(sharp, K=0.0), front=stiff, rear=replace(stiff, crown=0.09)), grip=False
         )
         state = machine.upright(10.0)
-        state[4], state[9] = 0.1, -0.3  # leaning, and falling onto its springs
+        put(state, roll=0.1, z_rate=-0.3)  # leaning, and falling onto its springs
         before = machine.conserved(state)[0]
         rolls, travels = [], []
         for _ in range(800):

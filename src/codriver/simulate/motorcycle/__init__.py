@@ -1,17 +1,28 @@
 """A nonlinear motorcycle to hold observers against: any lean, toroidal tyres that saturate, own speed.
 
 parameters      what it has beyond Sharp's letters
+masses          what is left of a body without its parts
 tyre            magic formula with camber
 kinematics      frames, wheels, contacts
-machine         equations of motion
-rider, paths    who rides it, and where
+motion, forces  equations of motion
+machine         all of these, compiled
+course, paths   where it is ridden, and how fast
+rider           who rides it; rider_law: how he leans it
 ride            a ride, with the truth
 sensors         what sensors make of it
 """
 
+from codriver.simulate.motorcycle.course import Course, by_curvature, by_place
 from codriver.simulate.motorcycle.machine import INPUTS, OUTPUTS, STATES, Machine
-from codriver.simulate.motorcycle.parameters import FRONT_TYRE, REAR_TYRE, MachineParameters, TyreParameters
-from codriver.simulate.motorcycle.paths import double_lane_change, ramp, slalom
+from codriver.simulate.motorcycle.parameters import (
+    FRONT_TYRE,
+    REAR_TYRE,
+    MachineParameters,
+    Suspension,
+    TyreParameters,
+    UpperBody,
+)
+from codriver.simulate.motorcycle.paths import closed, double_lane_change, for_bends, ramp, slalom, straight
 from codriver.simulate.motorcycle.ride import Ride, ride
 from codriver.simulate.motorcycle.rider import Rider
 from codriver.simulate.motorcycle.sensors import IDEAL, SENSED, RideSensors, relative_noise, sense
@@ -24,16 +35,24 @@ __all__ = [
     "REAR_TYRE",
     "SENSED",
     "STATES",
+    "Course",
     "Machine",
     "MachineParameters",
     "Ride",
     "RideSensors",
     "Rider",
+    "Suspension",
     "TyreParameters",
+    "UpperBody",
+    "by_curvature",
+    "by_place",
+    "closed",
     "double_lane_change",
+    "for_bends",
     "ramp",
     "relative_noise",
     "ride",
     "sense",
     "slalom",
+    "straight",
 ]

@@ -1,0 +1,117 @@
+"""How a rider leans the machine with the handlebar: Riccati on Sharp's model, by what he feels, and as late as he feels it.
+
+    tau = tau_ref - k(v) (x^ - x_ref),   A x_ref + B tau_ref = 0 at the wanted roll
+    Y = S x,   S = -A_YY^-1 A_Yx                          a rider who does not feel the tyres takes their forces for settled
+    x^(t) = exp(A_r T) x(t - T) + integral exp(A_r s) B_r tau(t - s) ds      and foretells what he feels T late, from his own torques
+
+x: roll, steer, lateral velocity, yaw rate, roll rate, steer rate, tyre forces. A_r, B_r: Sharp's model with settled forces. Kleinman, Baron,
+Levison 1970 (Automatica 6, 357), doi:10.1016/0005-1098(70)90051-8, have a human controller with delay and prediction so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import expm, solve_continuous_are
+
+from codriver.models.motorcycle import MotorcycleParameters, motorcycle_model
+from codriver.signals.signal import Array
+
+# What a state's unit is worth to the rider: roll, steer, lateral velocity, yaw rate, roll rate, steer rate, both forces.
+WORTH = np.array([4e4, 4e3, 0.0, 0.0, 1e3, 1e2, 0.0, 0.0])
+FELT = 6  # states that are no forces
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """Torque at one speed: what(x(t - T)) + past(torques) + per wanted roll.
+
+    Attributes:
+        gain: of x, N m a unit, shape (8,).
+        past: of the torques since, the oldest first.
+        wanted: N m/rad.
+    """
+
+    gain: Array
+    past: Array
+    wanted: float
+
+
+@dataclass
+class Hands:
+    """The rider's law at all speeds, and his memory.
+
+    Attributes:
+        sharp: the machine as he knows it.
+        feels_forces: whether he feels the tyres' forces.
+        delay: T, s.
+        dt: of a tick, s.
+    """
+
+    sharp: MotorcycleParameters
+    feels_forces: bool
+    delay: float
+    dt: float
+    _laws: dict[int, Law] = field(default_factory=dict, init=False, repr=False)
+    _states: Array = field(init=False, repr=False)
+    _torques: Array = field(init=False, repr=False)
+    _known: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        late = round(self.delay / self.dt)
+        self._states, self._torques = np.zeros((late + 1, 8)), np.zeros(late)
+
+    def torque(self, speed: float, state: Array, wanted: float, strongest: float) -> float:
+        """Torque of this tick, N m.
+
+        Args:
+            speed: m/s.
+            state: x now.
+            wanted: roll, rad.
+            strongest: greatest torque, N m.
+        """
+        late = len(self._torques)
+        if self._known == 0:
+            self._states[:] = state
+        place = self._known % (late + 1)
+        self._states[place] = state
+        felt = self._states[(self._known + 1) % (late + 1)]
+        law = self._law(speed)
+        torque = law.wanted * wanted - float(law.gain @ felt)
+        if late:
+            now = self._known % late
+            torque -= float(law.past[: late - now] @ self._torques[now:]) + float(law.past[late - now :] @ self._torques[:now])
+        torque = min(max(torque, -strongest), strongest)
+        if late:
+            self._torques[self._known % late] = torque
+        self._known += 1
+        return torque
+
+    def _law(self, speed: float) -> Law:
+        """At the nearest whole m/s."""
+        key = round(speed)
+        if key not in self._laws:
+            plant = motorcycle_model(self.sharp)
+            A, B = plant.A(float(key)), plant.B
+            riccati = solve_continuous_are(A, B, np.diag(WORTH) + 1e-9 * np.eye(8), np.eye(1))
+            gain = (B.T @ riccati).ravel()
+            free = np.linalg.solve(np.hstack([A[:, 1:], B]), -A[:, 0])
+            wanted = float(free[-1] + gain @ np.concatenate([[1.0], free[:-1]]))
+            if not self.feels_forces:
+                settled = -np.linalg.solve(A[FELT:, FELT:], A[FELT:, :FELT])
+                gain = np.concatenate([gain[:FELT] + gain[FELT:] @ settled, [0.0, 0.0]])
+                A, B = A[:FELT, :FELT] + A[:FELT, FELT:] @ settled, B[:FELT]
+            self._laws[key] = self._foretold(gain, A, B, wanted)
+        return self._laws[key]
+
+    def _foretold(self, gain: Array, A: Array, B: Array, wanted: float) -> Law:
+        n, late = len(A), len(self._torques)
+        both = np.zeros((n + 1, n + 1))
+        both[:n, :n], both[:n, n:] = A, B
+        tick = expm(both * self.dt)
+        row, past = gain[:n].copy(), np.empty(late)
+        for i in range(late - 1, -1, -1):  # the newest torque first
+            past[i] = row @ tick[:n, n]
+            row = row @ tick[:n, :n]
+        return Law(np.concatenate([row, np.zeros(8 - n)]), past, wanted)
