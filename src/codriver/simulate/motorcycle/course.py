@@ -15,7 +15,7 @@ import numpy as np
 
 from codriver.signals.signal import Array
 
-STEP = 0.25  # m between the points that are kept
+STEP = 0.25  # m between the points that are kept, about
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,11 +23,13 @@ class Course:
     """A way.
 
     Attributes:
-        place: points at every `STEP`, m, shape (n, 2).
+        step: along the way from a point to the next, m.
+        place: the points, m, shape (n, 2).
         heading: there, rad.
         curvature: there, 1/m, to the left.
     """
 
+    step: float
     place: Array
     heading: Array
     curvature: Array
@@ -35,7 +37,7 @@ class Course:
     @property
     def length(self) -> float:
         """m."""
-        return STEP * (len(self.heading) - 1)
+        return self.step * (len(self.heading) - 1)
 
     def at(self, distance: float) -> tuple[float, float, float, float]:
         """x, y, m, heading, rad, and curvature, 1/m.
@@ -43,9 +45,10 @@ class Course:
         Args:
             distance: s, m.
         """
-        k = min(max(floor(distance / STEP), 0), len(self.heading) - 2)
-        share = min(max(distance / STEP - k, 0.0), 1.0)
-        over = distance - STEP * (k + share)  # outside of the course
+        places = distance / self.step
+        k = min(max(floor(places), 0), len(self.heading) - 2)
+        share = min(max(places - k, 0.0), 1.0)
+        over = (places - k - share) * self.step  # outside of the course
         heading = self.heading[k] + share * (self.heading[k + 1] - self.heading[k])
         bend = 0.0 if over else self.curvature[k] + share * (self.curvature[k + 1] - self.curvature[k])
         x, y = self.place[k] + share * (self.place[k + 1] - self.place[k])
@@ -97,13 +100,15 @@ def by_curvature(curvature: Callable[[Array], Array], length: float) -> Course:
         curvature: 1/m, to the left, against distance, m; of arrays.
         length: m.
     """
-    distance = STEP * np.arange(round(length / STEP) + 1)
-    turned = STEP * curvature(distance[:-1] + STEP / 2)
+    count = round(length / STEP)
+    step = length / count
+    distance = step * np.arange(count + 1)
+    turned = step * curvature(distance[:-1] + step / 2)
     heading = np.concatenate([[0.0], np.cumsum(turned)])
     middle = (heading[1:] + heading[:-1]) / 2
     # the chord of an arc is shorter than the arc
-    steps = STEP * np.sinc(turned / 2 / np.pi)[:, None] * np.column_stack([np.cos(middle), np.sin(middle)])
-    return Course(np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)]), heading, curvature(distance))
+    steps = step * np.sinc(turned / 2 / np.pi)[:, None] * np.column_stack([np.cos(middle), np.sin(middle)])
+    return Course(step, np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)]), heading, curvature(distance))
 
 
 def by_place(place: Callable[[float], float], length: float) -> Course:
@@ -123,4 +128,4 @@ def by_place(place: Callable[[float], float], length: float) -> Course:
     run -= run[1]  # x = 0 is the second point
     distance = STEP * np.arange(int(run[-1] / STEP) + 1)
     columns = [np.interp(distance, run, values) for values in (x, y, np.arctan(slope), bend)]
-    return Course(np.column_stack(columns[:2]), columns[2], columns[3])
+    return Course(STEP, np.column_stack(columns[:2]), columns[2], columns[3])

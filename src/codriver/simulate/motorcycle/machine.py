@@ -98,6 +98,12 @@ class Machine:
         return compiled(self._functions[1])
 
     @cached_property
+    def _linear(self) -> ca.Function:
+        x, w = ca.MX.sym("x", len(STATES)), ca.MX.sym("w", len(INPUTS))
+        value = self._functions[0](x, w)
+        return ca.Function("linear", [x, w], [ca.jacobian(value, x), ca.jacobian(value, w)])
+
+    @cached_property
     def _conserved(self) -> ca.Function:
         x = ca.SX.sym("x", len(STATES))
         q, u = ca.vertcat(x[:_PLACES], 0, 0), x[10:22]
@@ -154,9 +160,7 @@ class Machine:
             state: see `STATES`.
             inputs: see `INPUTS`.
         """
-        x, w = ca.MX.sym("x", len(STATES)), ca.MX.sym("w", len(INPUTS))
-        value = self._functions[0](x, w)
-        both = ca.Function("linear", [x, w], [ca.jacobian(value, x), ca.jacobian(value, w)])(state, inputs)
+        both = self._linear(state, inputs)
         return np.asarray(both[0]), np.asarray(both[1])
 
     def upright(self, speed: float) -> Array:

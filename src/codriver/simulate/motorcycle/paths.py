@@ -13,7 +13,7 @@ from math import pi, radians, sin
 import numpy as np
 
 from codriver.signals.signal import Array
-from codriver.simulate.motorcycle.course import STEP, Course, by_curvature, by_place
+from codriver.simulate.motorcycle.course import Course, by_curvature, by_place
 
 SpeedPlan = Callable[[float, float], float]  # m/s of the time, s, and the distance along the course, m
 LENGTH = 1000.0  # m, of courses that end nowhere
@@ -99,7 +99,7 @@ def closed(pieces: Sequence[tuple[float, float]] = LAP, laps: int = 1) -> Course
     one, other = max(
         ((i, j) for i in straights for j in straights if i < j), key=lambda pair: abs(sin(ways[pair[1]] - ways[pair[0]]))
     )
-    for _ in range(4):  # rounding to whole steps is felt once more
+    for _ in range(4):  # once is enough, but for the points' distance
         end = _of_pieces(lengths, pieces, 1).place[-1]
         across = np.array([[np.cos(ways[i]) for i in (one, other)], [np.sin(ways[i]) for i in (one, other)]])
         more = np.linalg.solve(across, -end)
@@ -155,10 +155,10 @@ def for_bends(
     allowed = np.sqrt(lateral / np.maximum(np.abs(course.curvature), 1e-9))
     square = np.clip(allowed, slowest, fastest) ** 2
     for i in range(1, len(square)):
-        square[i] = min(square[i], square[i - 1] + 2 * along * STEP)
+        square[i] = min(square[i], square[i - 1] + 2 * along * course.step)
     for i in range(len(square) - 2, -1, -1):
-        square[i] = min(square[i], square[i + 1] + 2 * braking * STEP)
-    distance, speeds = STEP * np.arange(len(square)), np.sqrt(square)
+        square[i] = min(square[i], square[i + 1] + 2 * braking * course.step)
+    distance, speeds = course.step * np.arange(len(square)), np.sqrt(square)
 
     def speed(_time: float, place: float = 0.0) -> float:
         return float(np.interp(place, distance, speeds))

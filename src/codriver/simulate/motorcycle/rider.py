@@ -2,7 +2,7 @@
 
     a = kappa(s + v T) v^2 - k_d e' - k_p e,   phi_ref = -atan(a / g) / (1 + share m_b l / (m h))     e offset of the road point
     tau: `rider_law`
-    lambda_ref = share phi_ref                                        lean of the body beside the machine
+    lambda_ref = share phi_ref,   hips (k_b - m_b g l) lambda_ref     lean of the body beside the machine
     M = (m (v_ref' + (v_ref - v) / tau_v) + drag) R                   to the rear wheel when positive, front brake when negative
     L = -(k_L phi + c_L phi') at a standstill, gone at `FEET_UP`      feet on the road
 
@@ -94,7 +94,7 @@ class Rider:
         parameters = self.machine.parameters
         p = parameters.sharp
         if self._hands is None:
-            self._hands = Hands(p, self.feels_forces, self.delay, dt)
+            self._hands = Hands(self.machine, self.feels_forces, self.delay, dt)
         moving = road_state(p.h, state)
         v = hypot(state[X_RATE], state[Y_RATE])
         self._distance = self.path.locate(*road_point(p.h, state), self._distance)[0]
@@ -106,8 +106,9 @@ class Rider:
         torque = self._hands.torque(max(v, RIDABLE), moving, self._wanted, self.strongest)
         given["rider_torque"] = torque
         given["roll_moment"] = -feet * (FEET[0] * state[ROLL] + FEET[1] * state[ROLL_RATE])
-        if parameters.upper_body is not None:
-            given["lean_torque"] = parameters.upper_body.stiffness * self.body * self._wanted
+        body = parameters.upper_body
+        if body is not None:
+            given["lean_torque"] = (body.stiffness - body.mass * p.g * body.above) * self.body * self._wanted
         now = self.speed(time, self._distance)
         wish = (self.speed(time + 0.05, self._distance + 0.05 * v) - now) / 0.05 + (now - v) / self.speed_time
         push = p.mass * wish + parameters.air_density * parameters.drag_area / 2 * v * v

@@ -1,11 +1,12 @@
-"""How a rider leans the machine with the handlebar: Riccati on Sharp's model, by what he feels, and as late as he feels it.
+"""How a rider leans the machine with the handlebar: Riccati on it riding straight ahead, by what he feels, as late as he feels it.
 
     tau = tau_ref - k(v) (x^ - x_ref),   A x_ref + B tau_ref = 0 at the wanted roll
     Y = S x,   S = -A_YY^-1 A_Yx                          a rider who does not feel the tyres takes their forces for settled
     x^(t) = exp(A_r T) x(t - T) + integral exp(A_r s) B_r tau(t - s) ds      and foretells what he feels T late, from his own torques
 
-x: roll, steer, lateral velocity, yaw rate, roll rate, steer rate, tyre forces. A_r, B_r: Sharp's model with settled forces. Kleinman, Baron,
-Levison 1970 (Automatica 6, 357), doi:10.1016/0005-1098(70)90051-8, have a human controller with delay and prediction so.
+x: roll, steer, lateral velocity of the road point, yaw rate, roll rate, steer rate, tyre forces. A, B: the machine's own linear model,
+hips held; A_r, B_r: with settled forces. Kleinman, Baron, Levison 1970 (Automatica 6, 357), doi:10.1016/0005-1098(70)90051-8, have a
+human controller with delay and prediction so. He does not know what large angles do.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import expm, solve_continuous_are
 
-from codriver.models.motorcycle import MotorcycleParameters, motorcycle_model
 from codriver.signals.signal import Array
+from codriver.simulate.motorcycle.machine import INPUTS, STATES, Machine
 
 # What a state's unit is worth to the rider: roll, steer, lateral velocity, yaw rate, roll rate, steer rate, both forces.
 WORTH = np.array([4e4, 4e3, 0.0, 0.0, 1e3, 1e2, 0.0, 0.0])
@@ -43,13 +44,13 @@ class Hands:
     """The rider's law at all speeds, and his memory.
 
     Attributes:
-        sharp: the machine as he knows it.
+        machine: that he knows.
         feels_forces: whether he feels the tyres' forces.
         delay: T, s.
         dt: of a tick, s.
     """
 
-    sharp: MotorcycleParameters
+    machine: Machine
     feels_forces: bool
     delay: float
     dt: float
@@ -92,8 +93,7 @@ class Hands:
         """At the nearest whole m/s."""
         key = round(speed)
         if key not in self._laws:
-            plant = motorcycle_model(self.sharp)
-            A, B = plant.A(float(key)), plant.B
+            A, B = lateral_model(self.machine, float(key))
             riccati = solve_continuous_are(A, B, np.diag(WORTH) + 1e-9 * np.eye(8), np.eye(1))
             gain = (B.T @ riccati).ravel()
             free = np.linalg.solve(np.hstack([A[:, 1:], B]), -A[:, 0])
@@ -115,3 +115,22 @@ class Hands:
             past[i] = row @ tick[:n, n]
             row = row @ tick[:n, :n]
         return Law(np.concatenate([row, np.zeros(8 - n)]), past, wanted)
+
+
+def lateral_model(machine: Machine, speed: float) -> tuple[Array, Array]:
+    """A and B of x' = A x + B tau, riding straight ahead, hips held: x as in `models.motorcycle`, shapes (8, 8) and (8, 1).
+
+    Args:
+        machine: the machine.
+        speed: m/s.
+    """
+    whole, inputs = machine.linearised(machine.upright(speed), np.zeros(len(INPUTS)))
+    names = ("roll", "steer", "y_rate", "yaw_rate", "roll_rate", "steer_rate", "front_lateral_force", "rear_lateral_force")
+    places = [STATES.index(name) for name in names]
+    A, B = whole[np.ix_(places, places)], inputs[places, :1]
+    # v_y = y' + h phi' - v psi: of the road point, across the machine
+    across = np.eye(8)
+    across[2, 4] = machine.parameters.sharp.h
+    A = across @ A @ np.linalg.inv(across)
+    A[2, 3] -= speed
+    return A, across @ B
