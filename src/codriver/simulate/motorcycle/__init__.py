@@ -10,6 +10,8 @@ course, paths   where it is ridden, and how fast
 rider           who rides it; rider_law: how he leans it
 ride            a ride, with the truth
 sensors         what sensors make of it
+scenarios       the rides of the 2018 paper; variations: other riders and tyres
+files           a ride as the files of a logger
 """
 
 from codriver.simulate.motorcycle.course import Course, by_curvature, by_place
@@ -25,7 +27,9 @@ from codriver.simulate.motorcycle.parameters import (
 from codriver.simulate.motorcycle.paths import closed, double_lane_change, for_bends, ramp, slalom, straight
 from codriver.simulate.motorcycle.ride import Ride, ride
 from codriver.simulate.motorcycle.rider import Rider
+from codriver.simulate.motorcycle.scenarios import SCENARIOS, RideRecord, RideSetting, nominal_machine, simulate_ride
 from codriver.simulate.motorcycle.sensors import IDEAL, SENSED, RideSensors, relative_noise, sense
+from codriver.simulate.motorcycle.variations import with_rider, with_tyres
 
 __all__ = [
     "FRONT_TYRE",
@@ -33,13 +37,16 @@ __all__ = [
     "INPUTS",
     "OUTPUTS",
     "REAR_TYRE",
+    "SCENARIOS",
     "SENSED",
     "STATES",
     "Course",
     "Machine",
     "MachineParameters",
     "Ride",
+    "RideRecord",
     "RideSensors",
+    "RideSetting",
     "Rider",
     "Suspension",
     "TyreParameters",
@@ -49,10 +56,14 @@ __all__ = [
     "closed",
     "double_lane_change",
     "for_bends",
+    "nominal_machine",
     "ramp",
     "relative_noise",
     "ride",
     "sense",
+    "simulate_ride",
     "slalom",
     "straight",
+    "with_rider",
+    "with_tyres",
 ]

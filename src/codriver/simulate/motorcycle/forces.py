@@ -1,7 +1,7 @@
 """What acts on the simulated motorcycle: weight, air, hands, engine, brake, springs, and the tyres on the road.
 
-    N = (k s + c s' + Y sin phi_w) / cos phi_w                        the tyre's spring lies in the wheel's plane
-    sigma / V F' + F = F_0(N, slip, camber)                           along and across, `tyre`
+N = (k s + c s' + Y sin phi_w) / cos phi_w                        the tyre's spring lies in the wheel's plane
+sigma / V F' + F = F_0(N, slip, camber)                           along and across, `tyre`
 """
 
 from __future__ import annotations

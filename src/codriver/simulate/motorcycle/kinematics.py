@@ -155,7 +155,9 @@ def pose(machine: MachineParameters, q: ca.SX, u: ca.SX) -> Pose:
     def at(frame: Frame, arm: ca.SX, origin: tuple[ca.SX, ca.SX], sliding: ca.SX = 0) -> tuple[ca.SX, ca.SX]:
         """Place and velocity of a point in a frame: arm from the origin, its rate in the frame."""
         turned = frame.rotation @ arm
-        return origin[0] + turned, origin[1] + ca.cross(frame.rate, turned) + frame.rotation @ (ca.SX.zeros(3) + sliding)
+        return origin[0] + turned, origin[1] + ca.cross(frame.rate, turned) + frame.rotation @ (
+            ca.SX.zeros(3) + sliding
+        )
 
     centre = ca.DM([0, 0, p.h])
     head = ca.DM([p.a * c, 0, p.a * s])  # foot of a on the steer axis

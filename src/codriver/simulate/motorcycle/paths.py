@@ -2,13 +2,13 @@
 
 Of the paper's own paths no figures are printed.
 
-    v(s) = min(v_max, sqrt(a_lat / |kappa|)),   then |dv/dt| limited both ways
+    v(s) = min(v_max, sqrt(a_lat / |kappa|)),   then |v'| <= a sqrt(1 - (kappa v^2 / a_lat)^2) both ways
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import pi, radians, sin
+from math import pi, radians, sin, sqrt
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from codriver.simulate.motorcycle.course import Course, by_curvature, by_place
 
 SpeedPlan = Callable[[float, float], float]  # m/s of the time, s, and the distance along the course, m
 LENGTH = 1000.0  # m, of courses that end nowhere
+LEANING = 6.0  # m before and behind a bend that count as in it
+IN_BENDS = 0.2  # of the acceleration along that is left at the greatest across
 
 
 def straight(length: float = LENGTH) -> Course:
@@ -76,7 +78,7 @@ def double_lane_change(
 
 # Length of arc, m, and angle, degrees to the left, of each piece; bends bend in and out over a third of their length each.
 LAP = (
-    (90.0, 0.0), (80.0, 95.0), (60.0, 0.0), (50.0, -80.0), (55.0, 100.0), (130.0, 0.0), (110.0, 85.0), (70.0, -75.0),
+    (90.0, 0.0), (80.0, 95.0), (60.0, 0.0), (60.0, -80.0), (40.0, 0.0), (32.0, 120.0), (150.0, 0.0), (100.0, 65.0), (70.0, -75.0),
     (45.0, 0.0), (60.0, 110.0), (60.0, 0.0), (75.0, -60.0), (80.0, 95.0), (60.0, 0.0), (90.0, 90.0),
 )  # fmt: skip
 
@@ -97,7 +99,8 @@ def closed(pieces: Sequence[tuple[float, float]] = LAP, laps: int = 1) -> Course
     ways = np.cumsum([0.0] + [radians(angle) for _, angle in pieces])[:-1]
     straights = [i for i, (_, angle) in enumerate(pieces) if not angle]
     one, other = max(
-        ((i, j) for i in straights for j in straights if i < j), key=lambda pair: abs(sin(ways[pair[1]] - ways[pair[0]]))
+        ((i, j) for i in straights for j in straights if i < j),
+        key=lambda pair: abs(sin(ways[pair[1]] - ways[pair[0]])),
     )
     for _ in range(4):  # once is enough, but for the points' distance
         end = _of_pieces(lengths, pieces, 1).place[-1]
@@ -106,7 +109,9 @@ def closed(pieces: Sequence[tuple[float, float]] = LAP, laps: int = 1) -> Course
         lengths[one] += float(more[0])
         lengths[other] += float(more[1])
     if min(lengths) < 0:
-        raise ValueError(f"the straights {one} and {other} would have to be {lengths[one]:.0f} and {lengths[other]:.0f} m")
+        raise ValueError(
+            f"the straights {one} and {other} would have to be {lengths[one]:.0f} and {lengths[other]:.0f} m"
+        )
     return _of_pieces(lengths, pieces, laps)
 
 
@@ -142,22 +147,33 @@ def ramp(first: float, last: float, begin: float, end: float) -> SpeedPlan:
 
 
 def for_bends(
-    course: Course, slowest: float, fastest: float, lateral: float, along: float = 2.5, braking: float = 3.0
-) -> SpeedPlan:
-    """As fast as bends allow.
+    course: Course, slowest: float, fastest: float, lateral: float, along: float = 2.5, braking: float = 3.0,
+    start: float | None = None,
+) -> SpeedPlan:  # fmt: skip
+    """As fast as bends allow; who leans neither brakes nor drives hard.
 
     Args:
         course: the way.
         slowest, fastest: m/s.
         lateral: greatest acceleration across, m/s^2; `slowest` goes before.
-        along, braking: greatest acceleration and deceleration, m/s^2.
+        along, braking: greatest acceleration and deceleration upright, m/s^2.
+        start: speed at the course's start, m/s; else what bends allow there.
     """
-    allowed = np.sqrt(lateral / np.maximum(np.abs(course.curvature), 1e-9))
-    square = np.clip(allowed, slowest, fastest) ** 2
+    from scipy.ndimage import maximum_filter1d
+
+    near = 2 * round(LEANING / course.step) + 1
+    bend = np.maximum(maximum_filter1d(np.abs(course.curvature), near), 1e-9)
+    square = np.clip(np.sqrt(lateral / bend), slowest, fastest) ** 2
+    square[0] = square[0] if start is None else min(square[0], start**2)
+
+    def most(i: int, upright: float) -> float:
+        used = min(bend[i] * square[i] / lateral, 1.0)
+        return 2 * course.step * upright * max(sqrt(1 - used * used), IN_BENDS)
+
     for i in range(1, len(square)):
-        square[i] = min(square[i], square[i - 1] + 2 * along * course.step)
+        square[i] = min(square[i], square[i - 1] + most(i - 1, along))
     for i in range(len(square) - 2, -1, -1):
-        square[i] = min(square[i], square[i + 1] + 2 * braking * course.step)
+        square[i] = min(square[i], square[i + 1] + most(i + 1, braking))
     distance, speeds = course.step * np.arange(len(square)), np.sqrt(square)
 
     def speed(_time: float, place: float = 0.0) -> float:

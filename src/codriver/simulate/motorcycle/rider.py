@@ -4,6 +4,7 @@
     tau: `rider_law`
     lambda_ref = share phi_ref,   hips (k_b - m_b g l) lambda_ref     lean of the body beside the machine
     M = (m (v_ref' + (v_ref - v) / tau_v) + drag) R                   to the rear wheel when positive, front brake when negative
+    w' = -w / T_w + noise                                             remnant, added to the torque; he does not know it
     L = -(k_L phi + c_L phi') at a standstill, gone at `FEET_UP`      feet on the road
 
 The wanted roll is filtered over `smoothing`, s. One point ahead is looked at, at T s, about what the machine takes to lean.
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import atan, cos, hypot, sin
+from math import atan, cos, hypot, sin, sqrt
 
 import numpy as np
 
@@ -26,6 +27,8 @@ from codriver.simulate.motorcycle.rider_law import Hands
 LeanPlan = Callable[[float], float]  # rad of the time, s
 FEET_DOWN, FEET_UP = 2.5, 4.0  # m/s
 FEET = 5000.0, 800.0  # k_L, N m/rad, and c_L, N m s/rad
+FRONT_BRAKE = 0.6  # share of the front brake
+REMNANT_TIME = 0.2  # s
 RIDABLE = 3.0  # m/s, the slowest at which the handlebar is used as at speed
 (X, Y, YAW, ROLL, STEER, X_RATE, Y_RATE, YAW_RATE, ROLL_RATE, STEER_RATE, FRONT, REAR) = (
     STATES.index(name)
@@ -54,6 +57,8 @@ class Rider:
         body: share of the roll by which the body leans further; needs an upper body.
         delay: by which the rider acts late on what he feels, s.
         feels_forces: whether he feels the tyres' forces.
+        remnant: sd of what his hands do beside, N m, for some `REMNANT_TIME`.
+        seed: of that.
     """
 
     machine: Machine
@@ -70,13 +75,18 @@ class Rider:
     body: float = 0.0
     delay: float = 0.0
     feels_forces: bool = True
+    remnant: float = 0.0
+    seed: int = 0
+    _noise: np.random.Generator = field(init=False, repr=False)
+    _beside: float = field(default=0.0, init=False)
     _wanted: float = field(default=0.0, init=False)
     _hands: Hands | None = field(default=None, init=False, repr=False)
     _distance: float = field(default=0.0, init=False)
 
     def begin(self) -> None:
         """Forget the last ride."""
-        self._wanted, self._distance, self._hands = 0.0, 0.0, None
+        self._wanted, self._distance, self._beside, self._hands = 0.0, 0.0, 0.0, None
+        self._noise = np.random.default_rng(self.seed)
 
     @property
     def distance(self) -> float:
@@ -104,7 +114,10 @@ class Rider:
         self._wanted += dt / self.smoothing * ((1 - feet) * wanted - self._wanted)
         given = dict.fromkeys(INPUTS, 0.0)
         torque = self._hands.torque(max(v, RIDABLE), moving, self._wanted, self.strongest)
-        given["rider_torque"] = torque
+        if self.remnant:
+            fade = dt / REMNANT_TIME
+            self._beside += sqrt(2 * fade) * self.remnant * self._noise.standard_normal() - fade * self._beside
+        given["rider_torque"] = torque + self._beside
         given["roll_moment"] = -feet * (FEET[0] * state[ROLL] + FEET[1] * state[ROLL_RATE])
         body = parameters.upper_body
         if body is not None:
@@ -112,7 +125,10 @@ class Rider:
         now = self.speed(time, self._distance)
         wish = (self.speed(time + 0.05, self._distance + 0.05 * v) - now) / 0.05 + (now - v) / self.speed_time
         push = p.mass * wish + parameters.air_density * parameters.drag_area / 2 * v * v
-        given["drive_torque"], given["front_brake_torque"] = max(push, 0) * p.Rr, max(-push, 0) * p.Rf
+        given["drive_torque"], given["front_brake_torque"] = (
+            (max(push, 0) - (1 - FRONT_BRAKE) * max(-push, 0)) * p.Rr,
+            FRONT_BRAKE * max(-push, 0) * p.Rf,
+        )
         return np.array([given[name] for name in INPUTS])
 
     def _lean_for_path(self, state: Array, v: float, aside: float) -> float:

@@ -82,7 +82,9 @@ class Hands:
         torque = law.wanted * wanted - float(law.gain @ felt)
         if late:
             now = self._known % late
-            torque -= float(law.past[: late - now] @ self._torques[now:]) + float(law.past[late - now :] @ self._torques[:now])
+            torque -= float(law.past[: late - now] @ self._torques[now:]) + float(
+                law.past[late - now :] @ self._torques[:now]
+            )
         torque = min(max(torque, -strongest), strongest)
         if late:
             self._torques[self._known % late] = torque
@@ -125,7 +127,16 @@ def lateral_model(machine: Machine, speed: float) -> tuple[Array, Array]:
         speed: m/s.
     """
     whole, inputs = machine.linearised(machine.upright(speed), np.zeros(len(INPUTS)))
-    names = ("roll", "steer", "y_rate", "yaw_rate", "roll_rate", "steer_rate", "front_lateral_force", "rear_lateral_force")
+    names = (
+        "roll",
+        "steer",
+        "y_rate",
+        "yaw_rate",
+        "roll_rate",
+        "steer_rate",
+        "front_lateral_force",
+        "rear_lateral_force",
+    )
     places = [STATES.index(name) for name in names]
     A, B = whole[np.ix_(places, places)], inputs[places, :1]
     # v_y = y' + h phi' - v psi: of the road point, across the machine
