@@ -102,7 +102,7 @@ def by_curvature(curvature: Callable[[Array], Array], length: float) -> Course:
     """
     count = round(length / STEP)
     step = length / count
-    distance = step * np.arange(count + 1)
+    distance = step * np.arange(count + 1, dtype=np.float64)
     turned = step * curvature(distance[:-1] + step / 2)
     heading = np.concatenate([[0.0], np.cumsum(turned)])
     middle = (heading[1:] + heading[:-1]) / 2

@@ -3,9 +3,9 @@
     R = Rz(psi) Rx(phi) Ry(theta),   front frame: R times the turn by delta about the steer axis (-sin eps, 0, cos eps)
     contact = hub + (R_w - rho - s) d - rho N,   its height 0 gives the tyre's deflection s
 
-q = (x, y, z, psi, phi, theta, delta, s_f, s_r, lambda, turn_f, turn_r): the rear frame's mass centre in the world (z up), m; yaw to
-the left, roll to the right, pitch nose down, steer to the left, rad; travel of the suspensions, pressed in, m; the rider's lean to the
-right of the frame, rad; turn of the wheels in their frames, rad. The rear frame's mass centre is Sharp's, rider upright.
+q = (x, y, z, psi, phi, theta, delta, s_f, s_r, lambda, turn_f, turn_r): the rear frame's mass centre in the world (z up), m; yaw
+to the left, roll to the right, pitch nose down, steer to the left, rad; travel of the suspensions, pressed in, m; the rider's lean to
+the right of the frame, rad; turn of the wheels in their frames, rad. The rear frame's mass centre is Sharp's, rider upright.
 
 A wheel is a torus: d the steepest way down in its plane, rho the crown radius, N the road's normal, R_w the radius. It gives way
 along d: the load and the side force of a balanced turn lie in the wheel's plane together, and with a crown of 0 the contact stays
@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from math import cos, sin
 
 import casadi as ca
+import numpy as np
 
 from codriver.simulate.motorcycle.masses import Solid, solid, without
 from codriver.simulate.motorcycle.parameters import MachineParameters
@@ -28,6 +29,7 @@ COORDINATES = (
 UP = ca.DM([0, 0, 1])
 LEFT = ca.DM([0, 1, 0])
 AHEAD = ca.DM([1, 0, 0])
+NOWHERE = ca.DM([0, 0, 0])
 
 
 def turn(axis: ca.DM, angle: ca.SX) -> ca.SX:
@@ -128,7 +130,8 @@ def solids(machine: MachineParameters) -> tuple[Solid, Solid]:
     """
     p = machine.sharp
     c, s = cos(p.eps), sin(p.eps)
-    rear = solid(p.Mr, (0, 0, p.h), [[p.Irx, 0, p.Crxz], [0, machine.rear_pitch_inertia, 0], [p.Crxz, 0, p.Irz]])
+    of_rear = np.array([[p.Irx, 0, p.Crxz], [0, machine.rear_pitch_inertia, 0], [p.Crxz, 0, p.Irz]])
+    rear = solid(p.Mr, (0, 0, p.h), of_rear)
     tilt = ca.DM([[c, 0, -s], [0, 1, 0], [s, 0, c]])  # columns: across the steer axis, left, along it
     inertia = (tilt @ ca.diag(ca.DM([p.Ifx, machine.front_pitch_inertia, p.Ifz])) @ tilt.T).full()
     centre = (p.a * c - p.f * s + p.e * c, 0, p.a * s + p.f * c + p.e * s)
@@ -150,32 +153,31 @@ def pose(machine: MachineParameters, q: ca.SX, u: ca.SX) -> Pose:
     rolled = heading @ turn(AHEAD, q[4])
     rear = Frame(rolled @ turn(LEFT, q[5]), u[3] * UP + u[4] * heading @ AHEAD + u[5] * rolled @ LEFT)
     front = Frame(rear.rotation @ turn(axis, q[6]), rear.rate + u[6] * rear.rotation @ axis)
-    place = {}
 
-    def at(frame: Frame, arm: ca.SX, origin: tuple[ca.SX, ca.SX], sliding: ca.SX = 0) -> tuple[ca.SX, ca.SX]:
+    def at(
+        frame: Frame, arm: ca.SX | ca.DM, origin: tuple[ca.SX, ca.SX], sliding: ca.SX | ca.DM = NOWHERE
+    ) -> tuple[ca.SX, ca.SX]:  # fmt: skip
         """Place and velocity of a point in a frame: arm from the origin, its rate in the frame."""
         turned = frame.rotation @ arm
-        return origin[0] + turned, origin[1] + ca.cross(frame.rate, turned) + frame.rotation @ (
-            ca.SX.zeros(3) + sliding
-        )
+        return origin[0] + turned, origin[1] + ca.cross(frame.rate, turned) + frame.rotation @ sliding
 
     centre = ca.DM([0, 0, p.h])
     head = ca.DM([p.a * c, 0, p.a * s])  # foot of a on the steer axis
     origin = q[:3], u[:3]
     steered = at(rear, head - centre, origin)
-    hubs = ca.DM([p.front, 0, p.Rf]), ca.DM([-p.b, 0, p.Rr])
+    front_arm, rear_arm = ca.DM([p.front, 0, p.Rf]), ca.DM([-p.b, 0, p.Rr])
+    front_hub, rear_hub = at(front, front_arm - head, steered), at(rear, rear_arm - centre, origin)
     whole_rear, whole_front = solids(machine)
-    parts_rear, parts_front, bodies = [], [], []
-    place["front"], place["rear"] = at(front, hubs[0] - head, steered), at(rear, hubs[1] - centre, origin)
+    parts_rear: list[Solid] = []
+    parts_front: list[Solid] = []
+    bodies: list[Body] = []
     if soft is not None:
-        place["front"] = at(front, hubs[0] - head + q[7] * axis, steered, u[7] * axis)
-        place["rear"] = at(rear, hubs[1] - centre + q[8] * UP, origin, u[8] * UP)
-        for name, frame, mass, hub, parts in (
-            ("front", front, soft.front_unsprung, hubs[0], parts_front),
-            ("rear", rear, soft.rear_unsprung, hubs[1], parts_rear),
-        ):
-            parts.append(solid(mass, hub.full().ravel(), (0, 0, 0)))
-            bodies.append(Body(frame, mass, ca.SX(3, 3), *place[name]))
+        front_hub = at(front, front_arm - head + q[7] * axis, steered, u[7] * axis)
+        rear_hub = at(rear, rear_arm - centre + q[8] * UP, origin, u[8] * UP)
+        parts_front.append(solid(soft.front_unsprung, front_arm.full().ravel(), (0, 0, 0)))
+        parts_rear.append(solid(soft.rear_unsprung, rear_arm.full().ravel(), (0, 0, 0)))
+        bodies.append(Body(front, soft.front_unsprung, ca.SX(3, 3), *front_hub))
+        bodies.append(Body(rear, soft.rear_unsprung, ca.SX(3, 3), *rear_hub))
     if rider is not None:
         hip = ca.DM([rider.hip[0], 0, rider.hip[1]])
         body = solid(rider.mass, (rider.hip[0], 0, rider.hip[1] + rider.above), rider.inertia)
@@ -205,8 +207,8 @@ def pose(machine: MachineParameters, q: ca.SX, u: ca.SX) -> Pose:
     free_f, free_r = p.Rf + load_f / machine.front.radial_stiffness, p.Rr + load_r / machine.rear.radial_stiffness
     return Pose(
         rear, front, tuple(bodies),
-        wheel(front, place["front"], u[10], p.ify, free_f, machine.front.crown),
-        wheel(rear, place["rear"], u[11], p.iry, free_r, machine.rear.crown),
+        wheel(front, front_hub, u[10], p.ify, free_f, machine.front.crown),
+        wheel(rear, rear_hub, u[11], p.iry, free_r, machine.rear.crown),
         *at(rear, ca.DM(machine.imu) - centre, origin),
     )  # fmt: skip
 

@@ -1,9 +1,9 @@
 """The simulated motorcycle: state, inputs, equations of motion (`motion`), forces (`forces`), compiled (`compiled`).
 
 In: any roll, pitch and steer; heave and pitch on the tyres' radial springs and, if wished, fork and rear spring, so load transfer;
-toroidal tyres; magic-formula forces with relaxation, camber, saturation, load; both wheels' spin and longitudinal slip, drive torque
-and brakes; drag of the air; pneumatic trail; steer damper; a rider who leans beside the machine, if wished; a road whose bank
-changes and that turns. Not in: flexible frame, chain, end stops, unevenness, lift of the air. Contacts are frictionless to turning
+toroidal tyres; magic-formula forces with relaxation, camber, saturation, load; both wheels' spin and longitudinal slip, drive and
+brakes; drag of the air; pneumatic trail; steer damper; a rider who leans beside the machine, if wished; a road whose bank changes
+and that turns. Not in: flexible frame, chain, end stops, unevenness, lift of the air. Contacts are frictionless to turning
 about the normal, apart from the trail.
 
 State: q[0:10], u (12), then longitudinal force front and rear, lateral force front and rear, N.
@@ -21,8 +21,7 @@ import numpy as np
 from codriver.signals.signal import Array
 from codriver.simulate.motorcycle.compiled import compiled
 from codriver.simulate.motorcycle.forces import forces, potential_energy
-from codriver.simulate.motorcycle.kinematics import COORDINATES, pose, turn
-from codriver.simulate.motorcycle.kinematics import UP as _UP
+from codriver.simulate.motorcycle.kinematics import COORDINATES, UP, pose, turn
 from codriver.simulate.motorcycle.motion import Flow, angular_momentum, inertia_and_rest, kinetic_energy
 from codriver.simulate.motorcycle.parameters import MachineParameters
 
@@ -35,8 +34,8 @@ INPUTS = (
     "rider_torque", "drive_torque", "front_brake_torque", "lean_torque", "roll_moment", "bank", "road_roll_rate",
     "road_pitch_rate", "road_roll_acceleration", "heading_error",
 )  # fmt: skip
-# N m: hands, to the left; forward; backward; hips and feet, to the right. Then of the road, about its own course and left: rad to the
-# right, rad/s, rad/s^2; and the machine's heading less the course's, rad.
+# N m: hands, to the left; forward; backward; hips and feet, to the right. Then of the road, about its own course and left: rad to
+# the right, rad/s, rad/s^2; and the machine's heading less the course's, rad.
 OUTPUTS = (
     "body_roll_rate", "body_pitch_rate", "body_yaw_rate", "force_x", "force_y", "force_z", "front_load", "rear_load",
     "front_tan_slip", "rear_tan_slip",
@@ -65,13 +64,13 @@ class Machine:
         flow = Flow(q, u, ca.SX.sym("road", 3), ca.SX.sym("road_rate", 3))
         at = pose(self.parameters, q, u)
         given = {name: inputs[i] for i, name in enumerate(INPUTS)}
-        course = turn(_UP, -given["heading_error"])
+        course = turn(UP, -given["heading_error"])
         bank = given["bank"]
         gravity = self.parameters.sharp.g * course @ ca.vertcat(0, -ca.sin(bank), -ca.cos(bank))
         acting = forces(self.parameters, at, q, u, x[22:], given, gravity, road=self.road, grip=self.grip)
         mass, rest = inertia_and_rest(at, flow)
         imu = flow.acceleration(at.imu, at.imu_velocity) - gravity, ca.jacobian(at.imu_velocity, u)
-        heading = turn(_UP, x[3])
+        heading = turn(UP, x[3])
         free = [q, u, flow.road, flow.road_rate]
         level = [
             ca.vertcat(0, 0, x[2], 0, x[4:_PLACES], 0, 0), ca.vertcat(heading.T @ x[10:13], x[13:22]),

@@ -2,8 +2,8 @@
 
     sum_i J_v^T m a + J_w^T (I w' + w x I w) + J_w^T d/dt(i_w Omega axle) = Q,     J = dv/du
 
-The road may turn under the machine: v = v_road + w_r x (p - foot), w = w_road + w_r, where w_r is what the road's frame turns beside
-the heading (`banked`). J is of the motion on the road alone; what the turning road adds is known.
+The road may turn under the machine: v = v_road + w_r x (p - foot), w = w_road + w_r, where w_r is how the road's frame turns beside
+the heading (`ride`). J is of the motion on the road alone; what the turning road adds is known.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 Truth in the observers' terms (`models.motorcycle`): roll, steer, their rates, yaw rate about the road's normal, lateral velocity of
 the road point, tyre forces, rider torque, speed; and the IMU's ideal signals in body axes.
 
-A banked road leans to the right of its course by beta(s). Its frame turns with the course about the vertical, of which the machine on
-its flat ground knows only the part about the normal; the rest is added to all that feels inertia:
+A banked road leans to the right of its course by beta(s). Its frame turns with the course about the vertical, of which the machine
+on its flat ground knows only the part about the normal; the rest is added to all that feels inertia:
 
     w_r = (beta', kappa v tan beta, 0) in the course's axes
 """

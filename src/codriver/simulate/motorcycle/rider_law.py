@@ -1,12 +1,12 @@
-"""How a rider leans the machine with the handlebar: Riccati on it riding straight ahead, by what he feels, as late as he feels it.
+"""How a rider leans the machine with the handlebar: Riccati's gain for riding straight ahead, on what he feels, as late as he does.
 
     tau = tau_ref - k(v) (x^ - x_ref),   A x_ref + B tau_ref = 0 at the wanted roll
     Y = S x,   S = -A_YY^-1 A_Yx                          a rider who does not feel the tyres takes their forces for settled
-    x^(t) = exp(A_r T) x(t - T) + integral exp(A_r s) B_r tau(t - s) ds      and foretells what he feels T late, from his own torques
+    x^(t) = exp(A_r T) x(t - T) + integral exp(A_r s) B_r tau(t - s) ds      he foretells what he feels T late, from his own torques
 
-x: roll, steer, lateral velocity of the road point, yaw rate, roll rate, steer rate, tyre forces. A, B: the machine's own linear model,
-hips held; A_r, B_r: with settled forces. Kleinman, Baron, Levison 1970 (Automatica 6, 357), doi:10.1016/0005-1098(70)90051-8, have a
-human controller with delay and prediction so. He does not know what large angles do.
+x: roll, steer, lateral velocity of the road point, yaw rate, roll rate, steer rate, tyre forces. A, B: the machine's own linear
+model, hips held; A_r, B_r: with settled forces. He does not know what large angles do. A human controller with delay and prediction:
+Kleinman, Baron, Levison 1970 (Automatica 6, 357), doi:10.1016/0005-1098(70)90051-8.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ FELT = 6  # states that are no forces
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """Torque at one speed: what(x(t - T)) + past(torques) + per wanted roll.
+    """Torque at one speed: of the wanted roll, less that of what was felt T ago and of the torques since.
 
     Attributes:
-        gain: of x, N m a unit, shape (8,).
+        gain: of x(t - T), N m a unit, shape (8,).
         past: of the torques since, the oldest first.
         wanted: N m/rad.
     """

@@ -4,9 +4,9 @@ track                 a closed lap with bends to both sides, 30 to 100 km/h
 slalom                while speeding up from 50 to 100 km/h
 double-lane-change    at 100 km/h
 
-Of the paper's own courses no figures are printed: these are made up. Ridden by a late rider who leans his body and does not feel the
-tyres' forces, on Sharp's machine with suspension. Noise is in parts of each sensor's rms, as `sensors.relative_noise` has it.
-A bank, if wished, swings to both sides along the way:  beta(s) = bank sin(2 pi s / BANK_WAVE), risen over the first half wave.
+Of the paper's own courses no figures are printed: these are made up. Ridden by a late rider who leans his body and does not feel
+the tyres' forces, on Sharp's machine with suspension. Noise is in parts of each sensor's rms, as `sensors.relative_noise` has it. A
+bank, if wished, swings to both sides along the way: beta(s) = bank sin(2 pi s / BANK_WAVE), risen over the first half wave.
 """
 
 from __future__ import annotations

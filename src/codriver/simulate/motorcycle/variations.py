@@ -49,9 +49,10 @@ def with_rider(machine: MachineParameters, mass: float) -> MachineParameters:
     body = machine.upper_body
     if body is not None:
         scale = mass / NOMINAL_RIDER
+        roll, pitch, yaw = body.inertia
         body = replace(
             body, mass=UPPER_SHARE * mass, hip=(body.hip[0] - dx, body.hip[1]), stiffness=scale * body.stiffness,
-            damping=scale * body.damping, inertia=tuple(scale * value for value in body.inertia),
+            damping=scale * body.damping, inertia=(scale * roll, scale * pitch, scale * yaw),
         )  # fmt: skip
     heavier = replace(
         machine, sharp=moved, upper_body=body, rear_pitch_inertia=float(rear.inertia[1, 1]),
