@@ -51,7 +51,8 @@ def motorcycle(
 ) -> None:
     """Ride a motorcycle round a track, through a slalom or a double lane change.
 
-    The log has gyroscope and accelerometer in the leaning machine's axes, steer angle and wheel speed; the truth roll, forces, torque.
+    The log has gyroscope and accelerometer in the leaning machine's axes, steer angle and wheel speed;
+    the truth roll, forces and torque.
 
     Example: codriver simulate motorcycle -o ride --scenario slalom --noise 7.5 --bias 1
     """

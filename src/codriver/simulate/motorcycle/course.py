@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import cos, floor, sin
 
 import numpy as np
@@ -45,14 +46,19 @@ class Course:
         Args:
             distance: s, m.
         """
+        points = self._points
         places = distance / self.step
-        k = min(max(floor(places), 0), len(self.heading) - 2)
+        k = min(max(floor(places), 0), len(points) - 2)
         share = min(max(places - k, 0.0), 1.0)
         over = (places - k - share) * self.step  # outside of the course
-        heading = self.heading[k] + share * (self.heading[k + 1] - self.heading[k])
-        bend = 0.0 if over else self.curvature[k] + share * (self.curvature[k + 1] - self.curvature[k])
-        x, y = self.place[k] + share * (self.place[k + 1] - self.place[k])
-        return x + over * cos(heading), y + over * sin(heading), heading, bend
+        x, y, heading, bend = (a + share * (b - a) for a, b in zip(points[k], points[k + 1], strict=True))
+        return x + over * cos(heading), y + over * sin(heading), heading, 0.0 if over else bend
+
+    @cached_property
+    def _points(self) -> list[tuple[float, float, float, float]]:
+        """As Python's own numbers, which are faster one by one."""
+        x, y = self.place.T.tolist()
+        return list(zip(x, y, self.heading.tolist(), self.curvature.tolist(), strict=True))
 
     def curvature_at(self, distance: float) -> float:
         """Curvature, 1/m.

@@ -4,8 +4,8 @@
     contact = hub + (R_w - rho - s) d - rho N,   its height 0 gives the tyre's deflection s
 
 q = (x, y, z, psi, phi, theta, delta, s_f, s_r, lambda, turn_f, turn_r): the rear frame's mass centre in the world (z up), m; yaw
-to the left, roll to the right, pitch nose down, steer to the left, rad; travel of the suspensions, pressed in, m; the rider's lean to
-the right of the frame, rad; turn of the wheels in their frames, rad. The rear frame's mass centre is Sharp's, rider upright.
+to the left, roll to the right, pitch nose down, steer to the left, rad; travel of the suspensions, pressed in, m; the rider's lean
+to the right of the frame, rad; turn of the wheels in their frames, rad. The rear frame's mass centre is Sharp's, rider upright.
 
 A wheel is a torus: d the steepest way down in its plane, rho the crown radius, N the road's normal, R_w the radius. It gives way
 along d: the load and the side force of a balanced turn lie in the wheel's plane together, and with a crown of 0 the contact stays

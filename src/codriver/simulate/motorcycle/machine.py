@@ -13,13 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
 
 from codriver.signals.signal import Array
-from codriver.simulate.motorcycle.compiled import compiled
+from codriver.simulate.motorcycle.compiled import Code, compiled
 from codriver.simulate.motorcycle.forces import forces, potential_energy
 from codriver.simulate.motorcycle.kinematics import COORDINATES, UP, pose, turn
 from codriver.simulate.motorcycle.motion import Flow, angular_momentum, inertia_and_rest, kinetic_energy
@@ -32,10 +32,10 @@ STATES = (
 )  # fmt: skip
 INPUTS = (
     "rider_torque", "drive_torque", "front_brake_torque", "lean_torque", "roll_moment", "bank", "road_roll_rate",
-    "road_pitch_rate", "road_roll_acceleration", "heading_error",
+    "road_turn_rate", "road_roll_acceleration", "heading_error",
 )  # fmt: skip
-# N m: hands, to the left; forward; backward; hips and feet, to the right. Then of the road, about its own course and left: rad to
-# the right, rad/s, rad/s^2; and the machine's heading less the course's, rad.
+# N m: hands, to the left; forward; backward; hips and feet, to the right. Then of the road: its bank, rad, to the right, and the
+# bank's rates, rad/s, rad/s^2; the turn of its course, rad/s, to the left; the machine's heading less the course's, rad.
 OUTPUTS = (
     "body_roll_rate", "body_pitch_rate", "body_yaw_rate", "force_x", "force_y", "force_z", "front_load", "rear_load",
     "front_tan_slip", "rear_tan_slip",
@@ -57,49 +57,17 @@ class Machine:
     grip: bool = True
 
     @cached_property
-    def _functions(self) -> tuple[ca.Function, ca.Function]:
-        """Rates of the states, and `OUTPUTS`. Worked out in the heading's axes: the yaw angle is 0 there."""
-        x, inputs = ca.SX.sym("x", len(STATES)), ca.SX.sym("inputs", len(INPUTS))
-        q, u = ca.SX.sym("q", 12), ca.SX.sym("u", 12)
-        flow = Flow(q, u, ca.SX.sym("road", 3), ca.SX.sym("road_rate", 3))
-        at = pose(self.parameters, q, u)
-        given = {name: inputs[i] for i, name in enumerate(INPUTS)}
-        course = turn(UP, -given["heading_error"])
-        bank = given["bank"]
-        gravity = self.parameters.sharp.g * course @ ca.vertcat(0, -ca.sin(bank), -ca.cos(bank))
-        acting = forces(self.parameters, at, q, u, x[22:], given, gravity, road=self.road, grip=self.grip)
-        mass, rest = inertia_and_rest(at, flow)
-        imu = flow.acceleration(at.imu, at.imu_velocity) - gravity, ca.jacobian(at.imu_velocity, u)
-        heading = turn(UP, x[3])
-        free = [q, u, flow.road, flow.road_rate]
-        level = [
-            ca.vertcat(0, 0, x[2], 0, x[4:_PLACES], 0, 0), ca.vertcat(heading.T @ x[10:13], x[13:22]),
-            course @ ca.vertcat(given["road_roll_rate"], given["road_pitch_rate"], 0),
-            course @ ca.vertcat(given["road_roll_acceleration"], 0, 0),
-        ]  # fmt: skip
-        wanted = [
-            mass, acting.generalised - rest, acting.relaxing, at.rear.rotation, at.rear.rate + flow.road, *imu, acting.loads,
-            acting.slips,
-        ]  # fmt: skip
-        mass, pushed, relaxing, rotation, rate, specific, lever, loads, slips = ca.substitute(wanted, free, level)
-        diagonal, upper, order = ca.ldl(mass)
-        turned = ca.ldl_solve(pushed, diagonal, upper, order)
-        out = ca.vertcat(rotation.T @ rate, rotation.T @ (specific + lever @ turned), loads, slips)
-        moving = ca.vertcat(x[10:20], heading @ turned[:3], turned[3:], relaxing)
-        return ca.Function("rate", [x, inputs], [ca.cse(moving)]), ca.Function("output", [x, inputs], [ca.cse(out)])
-
-    @cached_property
     def _rate(self) -> Callable[[Array, Array], Array]:
-        return compiled(self._functions[0])
+        return _code(self.parameters, self.road, self.grip)[0].call()
 
     @cached_property
     def _output(self) -> Callable[[Array, Array], Array]:
-        return compiled(self._functions[1])
+        return _code(self.parameters, self.road, self.grip)[1].call()
 
     @cached_property
     def _linear(self) -> ca.Function:
         x, w = ca.MX.sym("x", len(STATES)), ca.MX.sym("w", len(INPUTS))
-        value = self._functions[0](x, w)
+        value = _functions(self.parameters, self.road, self.grip)[0](x, w)
         return ca.Function("linear", [x, w], [ca.jacobian(value, x), ca.jacobian(value, w)])
 
     @cached_property
@@ -173,3 +141,56 @@ class Machine:
         state[STATES.index("z")], state[STATES.index("x_rate")] = p.h, speed
         state[STATES.index("front_spin_rate")], state[STATES.index("rear_spin_rate")] = speed / p.Rf, speed / p.Rr
         return state
+
+
+@lru_cache(maxsize=8)
+def _code(parameters: MachineParameters, road: bool, grip: bool) -> tuple[Code, Code]:
+    """`_functions` as machine code: the same machine is compiled once."""
+    rate, output = _functions(parameters, road, grip)
+    return compiled(rate), compiled(output)
+
+
+def _functions(parameters: MachineParameters, road: bool, grip: bool) -> tuple[ca.Function, ca.Function]:
+    """Rates of the states, and `OUTPUTS`. Worked out in the heading's axes: the yaw angle is 0 there."""
+    x, inputs = ca.SX.sym("x", len(STATES)), ca.SX.sym("inputs", len(INPUTS))
+    q, u = ca.SX.sym("q", 12), ca.SX.sym("u", 12)
+    flow = Flow(q, u, ca.SX.sym("road", 3), ca.SX.sym("road_rate", 3))
+    at = pose(parameters, q, u)
+    given = {name: inputs[i] for i, name in enumerate(INPUTS)}
+    course, bank = turn(UP, -given["heading_error"]), given["bank"]
+    gravity = parameters.sharp.g * course @ ca.vertcat(0, -ca.sin(bank), -ca.cos(bank))
+    acting = forces(parameters, at, q, u, x[22:], given, gravity, road=road, grip=grip)
+    mass, rest = inertia_and_rest(at, flow)
+    imu = flow.acceleration(at.imu, at.imu_velocity) - gravity, ca.jacobian(at.imu_velocity, u)
+    heading = turn(UP, x[3])
+    free = [q, u, flow.road, flow.road_rate]
+    level = [
+        ca.vertcat(0, 0, x[2], 0, x[4:_PLACES], 0, 0), ca.vertcat(heading.T @ x[10:13], x[13:22]),
+        *_road_motion(course, given),
+    ]  # fmt: skip
+    wanted = [
+        mass, acting.generalised - rest, acting.relaxing, at.rear.rotation, at.rear.rate + flow.road, *imu, acting.loads,
+        acting.slips,
+    ]  # fmt: skip
+    mass, pushed, relaxing, rotation, rate, specific, lever, loads, slips = ca.substitute(wanted, free, level)
+    diagonal, upper, order = ca.ldl(mass)
+    turned = ca.ldl_solve(pushed, diagonal, upper, order)
+    out = ca.vertcat(rotation.T @ rate, rotation.T @ (specific + lever @ turned), loads, slips)
+    moving = ca.vertcat(x[10:20], heading @ turned[:3], turned[3:], relaxing)
+    return ca.Function("rate", [x, inputs], [ca.cse(moving)]), ca.Function("output", [x, inputs], [ca.cse(out)])
+
+
+def _road_motion(course: ca.SX, given: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX]:
+    """How a banked road's frame turns beside its turn about the normal, and the rate of that, in the heading's axes.
+
+    The course turns about the vertical, which leans to the left by the bank: r / cos(beta) about it is r about the normal and
+    r tan(beta) about the left. With r steady.
+
+    Args:
+        course: rotation from the course's axes.
+        given: inputs by name.
+    """
+    bank, rolling, turning = given["bank"], given["road_roll_rate"], given["road_turn_rate"]
+    rate = ca.vertcat(rolling, turning * ca.tan(bank), 0)
+    own = ca.vertcat(given["road_roll_acceleration"], turning * rolling / ca.cos(bank) ** 2, 0)
+    return course @ rate, course @ (own + ca.cross(turning * UP, rate))

@@ -6,14 +6,14 @@ the road point, tyre forces, rider torque, speed; and the IMU's ideal signals in
 A banked road leans to the right of its course by beta(s). Its frame turns with the course about the vertical, of which the machine
 on its flat ground knows only the part about the normal; the rest is added to all that feels inertia:
 
-    w_r = (beta', kappa v tan beta, 0) in the course's axes
+    w_r = (beta', kappa s' tan beta, 0) in the course's axes
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot, tan
+from math import cos, hypot
 
 import numpy as np
 
@@ -125,7 +125,9 @@ def _road(rider: Rider, state: Array, bank: Callable[[float], float]) -> tuple[f
         return 0.0, 0.0, 0.0, 0.0, 0.0
     place, d = rider.distance, _BANK_STEP
     before, here, after = bank(place - d), bank(place), bank(place + d)
-    v = hypot(state[X_RATE], state[Y_RATE])
     heading, bend = rider.path.at(place)[2:]
+    error = state[YAW] - heading
+    _, offset = rider.path.locate(*road_point(rider.machine.parameters.sharp.h, state), place)
+    ahead = hypot(state[X_RATE], state[Y_RATE]) * cos(error) / (1 - bend * offset)  # along the course, m/s
     slope, curve = (after - before) / (2 * d), (after - 2 * here + before) / d**2
-    return here, slope * v, bend * v * tan(here), curve * v * v, state[YAW] - heading
+    return here, slope * ahead, bend * ahead, curve * ahead * ahead, error

@@ -5,8 +5,8 @@
     x^(t) = exp(A_r T) x(t - T) + integral exp(A_r s) B_r tau(t - s) ds      he foretells what he feels T late, from his own torques
 
 x: roll, steer, lateral velocity of the road point, yaw rate, roll rate, steer rate, tyre forces. A, B: the machine's own linear
-model, hips held; A_r, B_r: with settled forces. He does not know what large angles do. A human controller with delay and prediction:
-Kleinman, Baron, Levison 1970 (Automatica 6, 357), doi:10.1016/0005-1098(70)90051-8.
+model, hips held; A_r, B_r: with settled forces. He does not know what large angles do. A human with delay and prediction: Kleinman,
+Baron, Levison 1970 (Automatica 6, 357), doi:10.1016/0005-1098(70)90051-8.
 """
 
 from __future__ import annotations
