@@ -233,12 +233,20 @@ class TestScenarios:
         done = ride(Rider(machine, straight(), steady(20.0), lean=lambda _t: 0.6), 4.0, every=10)
         p, roll = machine.parameters.sharp, done.of("roll")[-1]
         crown = machine.parameters.front.crown
-        wheel = done.of("front_spin_rate")[-1] * p.Rf / done.speed[-1]
-        inside = (
-            p.h * sin(roll) * -done.of("yaw_rate")[-1] / done.speed[-1]
-        )  # the mass centre turns on a smaller circle
-        assert wheel == pytest.approx(p.Rf / (p.Rf - crown * (1 - cos(roll))) * (1 + inside), abs=4e-3)
+        wheel = done.of("front_spin_rate")[-1] * p.Rf / done.ahead[-1]
+        assert wheel == pytest.approx(p.Rf / (p.Rf - crown * (1 - cos(roll))), abs=4e-3)
         assert wheel > 1.02
+
+    def test_the_truths_speed_is_the_road_points(self, lane_change):
+        done, h = lane_change.ride, lane_change.ride.rider.machine.parameters.sharp.h
+        yaw, side = done.of("yaw"), h * np.sin(done.of("roll"))
+        place = np.column_stack([done.of("x") - side * np.sin(yaw), done.of("y") + side * np.cos(yaw)])
+        moving = np.gradient(place, done.time, axis=0)
+        ahead = np.cos(yaw) * moving[:, 0] + np.sin(yaw) * moving[:, 1]
+        aside = np.cos(yaw) * moving[:, 1] - np.sin(yaw) * moving[:, 0]
+        truth = lane_change.truth()
+        np.testing.assert_allclose(truth["longitudinal_speed"].values[1:-1], ahead[1:-1], atol=2e-3)
+        np.testing.assert_allclose(truth["lateral_velocity"].values[1:-1], aside[1:-1], atol=5e-3)
 
     def test_what_cannot_be_is_refused(self):
         for wrong in ({"scenario": "wheelie"}, {"rate": 300}, {"noise": -1.0}, {"seconds": 0.0}, {"bank": 1.0}):
