@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
 
+from codriver.cli.app import app
 from codriver.errors import UsageError
 from codriver.logs import read
 from codriver.simulate.motorcycle import (
@@ -31,9 +33,10 @@ from codriver.simulate.motorcycle import (
     with_rider,
     with_tyres,
 )
-from codriver.simulate.motorcycle.files import FILES, nominal_vehicle, write_ride
+from codriver.simulate.motorcycle.files import FILES, nominal_vehicle
 from codriver.simulate.motorcycle.paths import rise
 from codriver.simulate.motorcycle.tyre import cornering_stiffness
+from codriver.vehicles import load_vehicle
 
 KMH = 1 / 3.6
 
@@ -306,16 +309,24 @@ class TestVariations:
 
 
 class TestFiles:
-    def test_read_back(self, tmp_path):
-        files, record = write_ride(tmp_path / "ride", RideSetting("slalom", noise=0.075, seconds=1.0), seed=4)
-        assert sorted(path.name for path in (tmp_path / "ride").iterdir()) == sorted(FILES)
-        log = read(files.ride, names=files.names)
+    def test_what_the_command_writes_is_the_ride(self, tmp_path):
+        out = tmp_path / "ride"
+        asked = ["--scenario", "slalom", "--noise", "7.5", "--bias", "1", "--duration", "1", "--seed", "4"]
+        said = CliRunner().invoke(app, ["simulate", "motorcycle", "-o", str(out), *asked])
+        assert said.exit_code == 0, said.output
+        assert "50 to " in said.output
+        assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
+        record = simulate_ride(RideSetting("slalom", noise=0.075, bias=1.0, seconds=1.0), seed=4)
+        log = read(out / "ride.csv", names=out / "names.toml")
         for name, signal in record.log().items():
             np.testing.assert_allclose(log[name].values, signal.values, atol=2e-4)
             assert log[name].unit == signal.unit
-        truth = read(files.truth)
+        truth = read(out / "truth.parquet")
         for name, signal in record.truth().items():
             np.testing.assert_array_equal(truth[name].values, signal.values)
+        assert load_vehicle(out / "vehicle.toml") == nominal_vehicle()
+        again = CliRunner().invoke(app, ["simulate", "motorcycle", "-o", str(out)])
+        assert isinstance(again.exception, UsageError)
 
     def test_vehicle(self):
         vehicle, machine = nominal_vehicle(), nominal_machine()
