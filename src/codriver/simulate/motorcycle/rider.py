@@ -29,6 +29,7 @@ LeanPlan = Callable[[float], float]  # rad of the time, s
 FEET_DOWN, FEET_UP = 2.5, 4.0  # m/s
 FEET = 5000.0, 800.0  # k_L, N m/rad, and c_L, N m s/rad
 FRONT_BRAKE = 0.6  # share of the front brake
+LET_GO = 0.5  # m/s, below which the brakes are let go, so that they never push back
 REMNANT_TIME = 0.2  # s
 WRIST_TIME = 0.15  # s, over which throttle and brakes follow
 RIDABLE = 3.0  # m/s, the slowest at which the handlebar is used as at speed
@@ -125,11 +126,11 @@ class Rider:
         body = parameters.upper_body
         if body is not None:
             given["lean_torque"] = (body.stiffness - body.mass * p.g * body.above) * self.body * self._wanted
-        now = self.speed(time, self._distance)
-        wish = (self.speed(time + 0.05, self._distance + 0.05 * v) - now) / 0.05 + (now - v) / self.speed_time
+        now, ahead = self.speed(time, self._distance), state[X_RATE] * cos(state[YAW]) + state[Y_RATE] * sin(state[YAW])
+        wish = (self.speed(time + 0.05, self._distance + 0.05 * v) - now) / 0.05 + (now - ahead) / self.speed_time
         wanted_push = p.mass * wish + parameters.air_density * parameters.drag_area / 2 * v * v
         self._push += dt / WRIST_TIME * (wanted_push - self._push)
-        push = self._push
+        push = self._push if self._push > 0 else self._push * min(max(ahead / LET_GO, 0.0), 1.0)
         given["drive_torque"], given["front_brake_torque"] = (
             (max(push, 0) - (1 - FRONT_BRAKE) * max(-push, 0)) * p.Rr,
             FRONT_BRAKE * max(-push, 0) * p.Rf,
