@@ -118,7 +118,7 @@ class TestCourse:
 
 
 class TestBank:
-    @pytest.mark.parametrize("bank", [0.1, -0.1])
+    @pytest.mark.parametrize("bank", [0.1, pytest.param(-0.1, marks=pytest.mark.slow)])
     def test_steady_turn_on_a_banked_circle(self, machine, bank):
         """The gyroscope turns about the true vertical; roll by moments about the contacts in the road's axes."""
         rigid = replace(nominal_machine(), suspension=None, upper_body=None)
@@ -167,6 +167,21 @@ class TestBank:
         assert np.abs(banks).max() > 0.08
         assert np.ptp(done.of("roll")) > 0.4
         assert (true.inv() * attitude).magnitude() < 2e-3
+
+
+def test_the_accelerometer_is_the_second_derivative_of_its_place(machine):
+    """While swerving, by differences of the place that roll, pitch and yaw say, at 1 kHz."""
+    rider = Rider(machine, slalom(1.0, 40.0, start=2.0), steady(15.0), delay=0.15, feels_forces=False)
+    done = ride(rider, 2.0)
+    p = machine.parameters
+    angles = np.column_stack([done.of(name) for name in ("yaw", "roll", "pitch")])
+    body = Rotation.from_euler("ZXY", angles)
+    place = np.column_stack([done.of(name) for name in "xyz"]) + body.apply(np.array(p.imu) - [0, 0, p.sharp.h])
+    acceleration = (place[2:] - 2 * place[1:-1] + place[:-2]) / 1e-6
+    expected = body[1:-1].inv().apply(acceleration + [0, 0, p.sharp.g])
+    shown = np.column_stack([done.of(f"force_{axis}") for axis in "xyz"])
+    assert np.ptp(done.of("roll")) > 0.3
+    np.testing.assert_allclose(shown[1000:-1], expected[999:], atol=0.02)
 
 
 class TestRider:
