@@ -178,7 +178,7 @@ def test_the_accelerometer_is_the_second_derivative_of_its_place(machine):
     body = Rotation.from_euler("ZXY", angles)
     place = np.column_stack([done.of(name) for name in "xyz"]) + body.apply(np.array(p.imu) - [0, 0, p.sharp.h])
     acceleration = (place[2:] - 2 * place[1:-1] + place[:-2]) / 1e-6
-    expected = body[1:-1].inv().apply(acceleration + [0, 0, p.sharp.g])
+    expected = body[1:-1].inv().apply(acceleration + np.array([0, 0, p.sharp.g]))
     shown = np.column_stack([done.of(f"force_{axis}") for axis in "xyz"])
     assert np.ptp(done.of("roll")) > 0.3
     np.testing.assert_allclose(shown[1000:-1], expected[999:], atol=0.02)
