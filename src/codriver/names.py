@@ -74,6 +74,7 @@ _ENTRIES = (
     Quantity("pitch_rate", "rad/s", "deg/s", "q", "rotation about y, positive when the nose goes down", -7, 7),
     Quantity("roll_angle", "rad", "deg", "phi", "positive when leaning to the right", -pi / 2, pi / 2),
     Quantity("roll_acceleration", "rad/s^2", "rad/s^2", "p'", "time derivative of roll_rate"),
+    Quantity("pitch_angle", "rad", "deg", "theta", "positive when the nose is down", -pi / 2, pi / 2),
     Quantity("distance", "m", "m", "s", "distance travelled, the papers' curvilinear coordinate", -1e3, 1e7),
     Quantity("latitude", "deg", "deg", "lat", "north positive", -90, 90),
     Quantity("longitude", "deg", "deg", "lon", "east positive", -180, 180),
@@ -139,6 +140,15 @@ _ENTRIES = (
         2000,
     ),
     Quantity(
+        "rider_lean",
+        "rad",
+        "deg",
+        "lambda",
+        "of the rider's upper body beside the machine, positive to the right",
+        -pi / 2,
+        pi / 2,
+    ),
+    Quantity(
         "alignment_torque",
         "N*m",
         "N*m",
@@ -166,6 +176,7 @@ _ENTRIES = (
     Quantity("clutch", "1", "1", "clutch", "0 closed (torque passes) to 1 open (no torque passes)", 0, 1, inf),
     # the road
     Quantity("road_slope", "rad", "%", "alpha", "positive uphill", -0.6, 0.6),
+    Quantity("road_bank", "rad", "deg", "beta_r", "tilt across, positive when the right side is lower", -0.6, 0.6),
     Quantity("road_curvature", "1/m", "1/m", "rho", "positive to the left", -1, 1),
     Quantity("lateral_offset", "m", "m", "y", "of the centre of mass from the path, positive to the left", -20, 20),
     Quantity(
