@@ -84,13 +84,18 @@ def judge(run: str, log: cd.Log, vehicle: str, dt: float, yaw: cd.Signal, fricti
         ways["with yaw rate"] = (ways["bicycle-kalman"][0], given.with_signals(yaw))
         p = BicycleParameters.from_vehicle(cd.load_vehicle(vehicle))
         ways["and friction"] = (bicycle_kalman(p, dt, friction=friction), given.with_signals(yaw))
-        ways["the benchmark bicycle instead"] = (build("bicycle-kalman", "meijaard2007", dt=dt), given.with_signals(yaw))
+        ways["the benchmark bicycle instead"] = (
+            build("bicycle-kalman", "meijaard2007", dt=dt),
+            given.with_signals(yaw),
+        )
     print(f"    torque zero {rms(torque[k:]):.2f}")
     for name, (observer, fed) in ways.items():
         found = cd.compile(observer).run(fed).columns
         roll_line(name, found["roll_angle"], roll, found["roll_angle_sd"], k)
         torque_line(name, found["rider_torque"], found["rider_torque_sd"], torque, dt, k)
-        print(f"      zero of the encoder {found['steer_offset'][-1]:.4f}, gyroscope's bias {found['roll_rate_bias'][-1]:.4f}")
+        print(
+            f"      zero of the encoder {found['steer_offset'][-1]:.4f}, gyroscope's bias {found['roll_rate_bias'][-1]:.4f}"
+        )
 
 
 def main() -> None:

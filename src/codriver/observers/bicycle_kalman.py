@@ -10,10 +10,10 @@ The roll angle is no row. It is seen in the first equation of motion, as the lea
 would move as it does; a lasting m cannot be told from a lean, so m forgets itself in T_m, and its size is a lean's: sd `moment`
 times the moment that gravity has per rad.
 
-The encoder's zero is found by the yaw rate. Without one, the ride is taken to go straight on the average: delta is white noise of
-intensity `straight`, by which zero and roll settle within some tens of seconds; a long bend without a yaw rate is then a wrong zero,
-and makes a wrong roll, that the band does not show. With `friction` T_c tanh(delta' / 0.05 rad/s) is added to T, as in
-`models.steer_row`. The scatter of the gyroscope's samples is learnt (`learn_scatter`).
+The encoder's zero is found by the yaw rate. Without one, the ride is taken to go straight on the average: delta is white noise
+of intensity `straight`, by which zero and roll settle within some tens of seconds. A long bend without a yaw rate is then taken for
+a wrong zero, and makes a wrong roll that the band does not show. With `friction` T_c tanh(delta' / 0.05 rad/s) is added to T, as
+in `models.steer_row`. The scatter of the gyroscope's samples is learnt (`learn_scatter`).
 
 Meijaard, Papadopoulos, Ruina, Schwab 2007, doi:10.1098/rspa.2007.1857; Kalman 1960, doi:10.1115/1.3662552.
 """
@@ -47,7 +47,10 @@ GYRO = ("roll_rate", "yaw_rate")
 STATES = (
     "roll_angle", "steer_angle", "roll_rate", "steer_rate", "rider_torque", "roll_moment", "roll_rate_bias", "steer_offset",
 )  # fmt: skip
-OWN = {"roll_rate_bias": ("rad/s", "bias of roll_rate"), "steer_offset": ("rad", "what steer_angle shows straight ahead")}
+OWN = {
+    "roll_rate_bias": ("rad/s", "bias of roll_rate"),
+    "steer_offset": ("rad", "what steer_angle shows straight ahead"),
+}
 RANGE = (1.5, 12.0)  # m/s
 GAP, STALE, SETTLE = 1.0, 0.25, 5.0  # s
 SCATTER, SCATTER_TIME = dict.fromkeys(GYRO, 0.05), 2.0  # rad/s until learnt, s
@@ -78,12 +81,12 @@ class BicycleNoise:
     roll: float = 0.02
     steer: float = 0.4
     torque: float = 5.0
-    moment: float = 0.04
-    lasting: float = 0.5
+    moment: float = 0.05
+    lasting: float = 0.25
     walk: float = 1e-4
     creep: float = 1e-5
     encoder: float = 0.001
-    gyro: float = 0.02
+    gyro: float = 0.05
     turn: float = 0.05
     straight: float = 0.0025
     share: float = 0.06
@@ -243,5 +246,10 @@ def _outputs(low: float, high: float) -> tuple[Output, ...]:
         *outputs,
         Output("speed_in_range", "1", "flag", f"1 where the speed is between {low:.4g} and {high:.4g} m/s"),
         Output("turn_measured", "1", "flag", "1 where yaw rates come; 0: the ride is taken as straight on the average"),
-        Output("valid", "1", "flag", "1 where signals have come for a while, at a speed in range, and roll is known to 5 degrees"),
+        Output(
+            "valid",
+            "1",
+            "flag",
+            "1 where signals have come for a while, at a speed in range, and roll is known to 5 degrees",
+        ),
     )
