@@ -122,7 +122,7 @@ def _compiled(model: Path | None) -> Any:
         raise UsageError(
             "--assist predicted without --model", "a driver file",
             "learn one: codriver simulate circuit -o laps, then codriver driver fit laps/drive.csv --names laps/names.toml "
-            "-o anna.driver",
+            "--model ridge --signals steering_wheel_angle,road_curvature -o anna.driver",
         )  # fmt: skip
     return compile_observer(observer_of(load_driver(model)))
 
