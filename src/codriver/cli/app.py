@@ -20,7 +20,7 @@ from codriver.cli import (
     driver_horizon,
     estimate,
     export,
-    identify_alignment,
+    identify_driver,
     info,
     plot,
     reproduce,
@@ -44,7 +44,7 @@ app.command("demo")(demo.demo)
 app.command("info")(info.info)
 app.command("estimate")(estimate.estimate)
 app.command("smooth")(smooth.smooth)
-app.add_typer(identify_alignment.app, name="identify")
+app.add_typer(identify_driver.app, name="identify")
 app.command("tune")(tune.tune)
 app.command("style")(style.style)
 app.add_typer(driver_horizon.app, name="driver")

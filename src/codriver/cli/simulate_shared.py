@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from codriver.cli.options import Json
-from codriver.cli.simulate_circuit import Ahead, Direction, Driver, Out, Overwrite, Seed, Speed, Varied
+from codriver.cli.simulate_circuit import Ahead, Direction, Driver, Given, Out, Overwrite, Seed, Speed, Varied
 
 if TYPE_CHECKING:
     from codriver.simulate.shared_outcomes import Outcome
@@ -43,7 +43,7 @@ Report = Annotated[Path | None, typer.Option("--report", help="Report to write (
 
 
 def shared(
-    out: Out, driver: Driver = "anna", model: Model = None, assist: AssistKind = "predicted", gain: Gain = 0.5,
+    out: Out, driver: Driver = "anna", given: Given = "", model: Model = None, assist: AssistKind = "predicted", gain: Gain = 0.5,
     used_to_it: UsedToIt = 1.0, fade: Fading = True, drives: Drives = 3, variability: Varied = True, laps: Laps = 1,
     seed: Seed = 0, anticipation: Ahead = "far-point", direction: Direction = "both", speed: Speed = 50.0,
     overwrite: Overwrite = False, report: Report = None, json: Json = False,
@@ -58,14 +58,13 @@ def shared(
     from dataclasses import replace
 
     from codriver.cli.estimate import check_report
-    from codriver.cli.simulate_circuit import car_at
+    from codriver.cli.simulate_circuit import car_at, who_drives
     from codriver.cli.terminal import command_line, working
     from codriver.logs.write import complete_or_nothing
     from codriver.report.document import write_document
     from codriver.report.shared import shared_document
     from codriver.simulate.assist import Assist, Fade
     from codriver.simulate.circuit import CircuitSetting
-    from codriver.simulate.circuit_drivers import circuit_driver
     from codriver.simulate.circuit_files import FILES
     from codriver.simulate.folder import refuse_earlier, refuse_foreign
     from codriver.simulate.shared_control import SharedSetting, simulate_shared
@@ -78,7 +77,7 @@ def shared(
     check_report(report)
     chosen = Assist(assist, gain, fade=Fade() if fade else None)
     circuit = CircuitSetting(
-        circuit_driver(driver), Variability() if variability else None, anticipation, laps=laps, direction=direction,
+        who_drives(driver, given), Variability() if variability else None, anticipation, laps=laps, direction=direction,
         car=car_at(speed),
     )  # fmt: skip
     kinds = dict.fromkeys(("none", *(("present",) if assist == "predicted" else ()), assist))

@@ -4,6 +4,7 @@ drive.csv       what the simulator logs: wheel angle, torque, and what its vehic
 names.toml      what the columns mean
 truth.parquet   the driver's torque, the wheel's angle and rate, and where the two points were
 vehicle.toml    column and car
+truth.toml      the driver: his parameters, about which his gains drift if he varies
 """
 
 from __future__ import annotations
@@ -16,13 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from codriver.logs.write import Column, write_table
+from codriver.models.two_point_file import FiledDriver, save_two_point
 from codriver.signals import Log
 from codriver.signals.signal import Array
 from codriver.simulate.circuit import CircuitDrive, CircuitSetting, simulate_circuit
 from codriver.simulate.folder import refuse_foreign, write_folder
 from codriver.vehicles import Vehicle, save_vehicle
 
-FILES = ("drive.csv", "names.toml", "truth.parquet", "vehicle.toml")
+FILES = ("drive.csv", "names.toml", "truth.parquet", "vehicle.toml", "truth.toml")
 _DEGREE = 180 / pi
 # Standard name, column, unit in the file, factor from SI, digits.
 _COLUMNS = (
@@ -42,6 +44,7 @@ class CircuitFiles:
     names: Path
     truth: Path
     vehicle: Path
+    driver: Path
 
 
 def write_circuit(
@@ -81,6 +84,8 @@ def write_files(drive: CircuitDrive, folder: Path, more: Mapping[str, tuple[Arra
     truth = drive.truth()
     columns = [Column(signal.name, signal.values, signal.unit) for signal in truth.values()]
     columns += [Column(name, values, unit) for name, (values, unit) in (more or {}).items()]
+    filed = FiledDriver.of(drive.setting.driver, "truth", f"drove the circuit, seed {drive.seed}")
+    save_two_point(filed, files.driver)
     write_table(files.truth, drive.time, columns, {"source": truth.source, "seed": str(drive.seed)})
     save_vehicle(circuit_vehicle(drive.setting), files.vehicle)
 
