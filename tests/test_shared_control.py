@@ -392,6 +392,14 @@ class TestCommand:
         assert {"authority", "driver_torque_ahead"} <= set(table.column_names)
         assert (out / "drive.csv").read_text().splitlines()[0].endswith(",MotorTorque")
         assert "Change against no assist" in report.read_text()
+        assert not any("learnt at" in f["text"] for f in told["findings"])
+        slower = (
+            CliRunner()
+            .invoke(app, [*command, "--overwrite", "--drives", "1", "--speed", "40", "--report", str(report)])
+            .output
+        )
+        assert "drives at 40 km/h here" in report.read_text()
+        assert "learnt at 50 km/h on average, and drives at 40 km/h here" in slower
         again = CliRunner().invoke(app, command)
         assert isinstance(again.exception, CodriverError)
         said = CliRunner().invoke(
