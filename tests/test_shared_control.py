@@ -210,6 +210,13 @@ class TestForetold:
             simulate_shared(SharedSetting(ONE_LAP, Assist("predicted")))
         with pytest.raises(UsageError, match=r"ticks every 0\.1 s in a drive that ticks every 0\.03 s"):
             simulate_shared(SharedSetting(replace(ONE_LAP, dt=0.03), Assist("predicted")), compiled())
+        log = driven(direction="left")
+        sideways = replace(
+            log["yaw_rate"], name="lateral_acceleration", values=14 * log["yaw_rate"].values, unit="m/s^2"
+        )
+        other = compile(observer_of(fit_driver(log.with_signals(sideways), "pwc")))
+        with pytest.raises(UsageError, match="a driver model that wants lateral_acceleration"):
+            simulate_shared(SharedSetting(ONE_LAP, Assist("predicted")), other)
         with pytest.raises(UsageError, match="assist 'help'"):
             Assist("help")
         with pytest.raises(UsageError, match="gain is -1"):
