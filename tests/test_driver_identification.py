@@ -332,7 +332,7 @@ class TestDualFilter:
         record = driver_record(clean, truth.near, truth.far)
         names = ("anticipation", "compensation", "delay")
         known = replace(truth, anticipation=4.6, compensation=9.0, delay=0.12)
-        ends = {r: dual_ekf(record, known, names, recurrent=r).last() for r in (True, False)}
+        ends = {r: dual_ekf(record, known, names, DualTuning(doubt=2.0), recurrent=r).last() for r in (True, False)}
         assert ends[True]["anticipation"][0] == pytest.approx(truth.anticipation, rel=0.02)
         assert ends[True]["compensation"][0] == pytest.approx(truth.compensation, rel=0.15)
         off = {r: abs(np.log(end["anticipation"][0] / truth.anticipation)) for r, end in ends.items()}
