@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from codriver.cli.identify import Overwrite, Report, _check_outputs, _finite
+from codriver.cli.identify import Report, _check_outputs, _finite
 from codriver.cli.identify_alignment import app
-from codriver.cli.options import Bus, Dbc, Json, Names, VehicleName
+from codriver.cli.options import Bus, Dbc, Json, Names
 
 if TYPE_CHECKING:
     from codriver.identify import DriverFit
@@ -37,6 +37,11 @@ Beside = Annotated[
     typer.Option("--beside", metavar="OTHER.toml", help="Another driver file to compare with, such as truth.toml of a simulation.",
                  show_default=False),
 ]  # fmt: skip
+VehicleName = Annotated[
+    str | None, typer.Option("--vehicle", help="Built-in name or TOML file: its column tells the torque, where no sensor does.",
+                             show_default=False),
+]  # fmt: skip
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a driver file that is there.")]
 
 
 @app.command("driver")
