@@ -61,7 +61,7 @@ def driver_findings(fit: DriverFit) -> tuple[Finding, ...]:
     found += [
         Finding(
             "warn",
-            f"the torque is no sensor's ({source}): the estimate's lag is in tau_p and T_N, its smoothness in K_t",
+            f"the torque is no sensor's ({source}): the estimate's lag and errors bias what is found",
         )
         for source in sorted(set(fit.estimated))
     ]
