@@ -63,3 +63,27 @@ def test_the_same_seed_gives_the_same_model() -> None:
     X, y = rows(500, 1)
     first, second = (GuardedRegressor().fit(X, y).predict(X) for _ in range(2))
     assert np.array_equal(first, second)
+
+
+def test_neighbours_in_time_may_go_beyond_what_was_learnt_together() -> None:
+    """What counts is the difference of two features; both drift out of their ranges."""
+    rng = np.random.default_rng(5)
+    angle = np.cumsum(0.1 * rng.standard_normal(3000))
+    X = np.stack([np.zeros(3000), angle, angle - 0.1 * rng.standard_normal(3000)], axis=1)
+    y = 5 * (X[:, 1] - X[:, 2]) + 0.1 * rng.standard_normal(3000)
+    model = GuardedRegressor(newest=(0, 1, 1)).fit(X, y)
+    beyond = X + np.array([0.0, np.ptp(angle), np.ptp(angle)]) * 0.6
+    assert rmse(y - model.predict(beyond)) < 0.5 * rmse(y)
+
+
+def test_no_change_is_foretold_that_was_never_seen() -> None:
+    """Features without noise leave directions that a line follows anywhere: here 1e6 times the training's."""
+    rng = np.random.default_rng(6)
+    angle = rng.standard_normal(2000)
+    twin = angle + 1e-4 * rng.standard_normal(2000)
+    X = np.stack([np.zeros(2000), angle, twin], axis=1)
+    y = 1e4 * (angle - twin)
+    model = GuardedRegressor(trees=5).fit(X, y)
+    Z = np.stack([np.zeros(500), np.zeros(500), rng.standard_normal(500)], axis=1)
+    assert np.abs(RidgeRegressor().fit(X, y).predict(Z)).max() > 100 * np.abs(y).max()
+    assert np.abs(model.predict(Z)).max() <= np.abs(y).max()

@@ -266,3 +266,19 @@ def test_the_road_ahead_is_worth_much_a_second_ahead() -> None:
     # The trial: 2.11 for "stays", 1.42 for the past alone, 1.04 with the road ahead.
     assert error[0.0] < 0.75 * stays
     assert error[1.6] < 0.75 * error[0.0]
+
+
+def test_sideslip_of_a_simulator_that_logs_the_lateral_velocity() -> None:
+    time = np.arange(0.0, 4.0, 0.01)
+    along, across = 20 - 5 * time, 0.3 * np.sin(time)
+    log = Log({}).with_signals(
+        Signal("lateral_velocity", time, across, "m/s", "a"), Signal("longitudinal_speed", time, along, "m/s", "a"),
+        Signal("driver_torque", time, across, "N m", "a"),
+    )  # fmt: skip
+    made, said = prepared(log)
+    beta = made["sideslip_angle"]
+    moving = np.interp(beta.time, time, along) > 2.05
+    wanted = np.arctan(np.interp(beta.time, time, across) / np.interp(beta.time, time, along))
+    assert np.abs(beta.values - wanted)[moving].max() < 2e-3
+    assert np.isnan(beta.values[np.interp(beta.time, time, along) < 1.9]).all()
+    assert any("sideslip_angle is that of" in sentence for sentence in said)

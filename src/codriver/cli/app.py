@@ -17,7 +17,7 @@ from codriver import __version__
 from codriver.cli import (
     check,
     demo,
-    driver_use,
+    driver_horizon,
     estimate,
     export,
     identify_driver,
@@ -47,7 +47,7 @@ app.command("smooth")(smooth.smooth)
 app.add_typer(identify_driver.app, name="identify")
 app.command("tune")(tune.tune)
 app.command("style")(style.style)
-app.add_typer(driver_use.app, name="driver")
+app.add_typer(driver_horizon.app, name="driver")
 app.add_typer(check.app, name="check")
 app.add_typer(plot.app, name="plot")
 app.add_typer(simulate.app, name="simulate")

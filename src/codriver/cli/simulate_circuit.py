@@ -9,6 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from codriver.models.two_point import TwoPointDriver
+    from codriver.simulate.rig import RigCar
 
 Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.", show_default=False)]
 Driver = Annotated[
@@ -49,24 +50,18 @@ def circuit(
 
     Example: codriver simulate circuit -o laps --driver ben
     """
-    from dataclasses import replace
-
     from codriver.cli.terminal import console
-    from codriver.errors import UsageError
     from codriver.identify.regression import rms
     from codriver.simulate.circuit import CircuitSetting
     from codriver.simulate.circuit_files import FILES, write_circuit
     from codriver.simulate.folder import refuse_earlier, refuse_foreign
-    from codriver.simulate.rig import RigCar
     from codriver.simulate.variability import Variability
 
     refuse_foreign(out, "circuit", FILES)
     refuse_earlier(out, overwrite)
-    if not 10 <= speed <= 120:
-        raise UsageError(f"--speed {speed:g}", "10 to 120 km/h", "choose one of these")
     setting = CircuitSetting(
-        _who(driver, given), Variability() if variability else None, anticipation, laps=laps, direction=direction,
-        car=replace(RigCar(), speed=speed / 3.6),
+        who_drives(driver, given), Variability() if variability else None, anticipation, laps=laps, direction=direction,
+        car=car_at(speed),
     )  # fmt: skip
     files, drive = write_circuit(out, setting, seed)
     console().print(
@@ -79,7 +74,23 @@ def circuit(
     )
 
 
-def _who(driver: str, given: str) -> TwoPointDriver:
+def car_at(speed: float) -> RigCar:
+    """The circuit's car at a speed, km/h.
+
+    Raises:
+        UsageError: it is no speed for the circuit.
+    """
+    from dataclasses import replace
+
+    from codriver.errors import UsageError
+    from codriver.simulate.rig import RigCar
+
+    if not 10 <= speed <= 120:
+        raise UsageError(f"--speed {speed:g}", "10 to 120 km/h", "choose one of these")
+    return replace(RigCar(), speed=speed / 3.6)
+
+
+def who_drives(driver: str, given: str) -> TwoPointDriver:
     """A driver by name, or of a file.
 
     Raises:

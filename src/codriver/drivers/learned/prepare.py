@@ -2,6 +2,7 @@
 
     T_dr      the best `driver-torque` estimator that log and vehicle can feed, causal
     r         single-track model driven by steering angle and speed (models/single_track)
+    beta      atan2(v_y, v_x), where the lateral velocity is logged (simulators)
 
 Both are named in the source of the signal, so whoever judges a model can see that its label or a feature is no measurement.
 """
@@ -35,6 +36,9 @@ def prepared(log: Log, vehicle: Vehicle | None = None) -> tuple[Log, tuple[str, 
     if not any(name in log for name in TARGETS):
         log, sentence = _with_torque(log, vehicle)
         said.append(sentence)
+    if "sideslip_angle" not in log and {"lateral_velocity", "longitudinal_speed"} <= set(log):
+        log = log.with_signals(derived_sideslip(log))
+        said.append("sideslip_angle is that of lateral velocity and speed")
     if "yaw_rate" not in log and {"steering_wheel_angle", "longitudinal_speed"} <= set(log) and vehicle is not None:
         try:
             car, ratio = SingleTrack.from_vehicle(vehicle), vehicle.number("steering_ratio")
@@ -64,6 +68,19 @@ def derived_yaw_rate(log: Log, car: SingleTrack, ratio: float) -> Signal:
             beta, rate = car.advance(beta, rate, float(steer[k]), max(float(speed[k]), SLOWEST), _TICK)
             made[k] = rate
     return Signal("yaw_rate", grid.time, made, "rad/s", "estimate: single track")
+
+
+def derived_sideslip(log: Log) -> Signal:
+    """Sideslip angle beta = atan2(v_y, v_x), rad; NaN below the single track's least speed, where it means nothing.
+
+    Args:
+        log: has lateral_velocity and longitudinal_speed.
+    """
+    grid = log.sample(["lateral_velocity", "longitudinal_speed"], _TICK)
+    across, along = grid.values["lateral_velocity"], grid.values["longitudinal_speed"]
+    known = grid.held["lateral_velocity"] & grid.held["longitudinal_speed"] & (along > SLOWEST)
+    beta = np.where(known, np.arctan2(across, np.where(known, along, 1.0)), np.nan)
+    return Signal("sideslip_angle", grid.time, beta, "rad", "derived: lateral velocity over speed")
 
 
 def _with_torque(log: Log, vehicle: Vehicle | None) -> tuple[Log, str]:
