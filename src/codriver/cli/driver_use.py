@@ -53,11 +53,14 @@ def predict(
     """
     import numpy as np
 
-    from codriver.cli.terminal import console, working
+    from codriver.cli.estimate import refuse_recording
+    from codriver.cli.terminal import console, say_findings, working
     from codriver.drivers.learned.driver_file import load_driver
+    from codriver.drivers.learned.likeness import doubts_of
     from codriver.logs.write import Column, check_output, write_table
 
     check_output(out)
+    refuse_recording(out, drive)
     known = load_driver(driver)
     with working(not json, 2) as stage:
         logs, notes = read_drives([drive], dbc, names, bus, vehicle, stage)
@@ -76,7 +79,8 @@ def predict(
         "rmse_Nm": float(np.sqrt(np.mean(error**2))) if error.size else None,
         "stays_rmse_Nm": float(np.sqrt(np.mean((made.measured - made.last)[there] ** 2))) if error.size else None,
         "inside95": float(np.mean(((made.measured >= made.low) & (made.measured <= made.high))[there])) if error.size else None,
-        "notes": notes, "result": str(out),
+        "findings": [{"severity": f.severity, "text": f.text} for f in doubts_of(known, made)], "notes": notes,
+        "result": str(out),
     }  # fmt: skip
     if json:
         typer.echo(json_module.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
@@ -91,6 +95,7 @@ def predict(
             f"RMSE {told['rmse_Nm']:.3f} N m (the torque stays: {told['stays_rmse_Nm']:.3f}); {told['inside95']:.1%} lie in the "
             "95 % band"
         )
+    say_findings(said, told["findings"])
     for note in notes:
         said.print(f"  note {note}", markup=False)
     said.print(f"\nwrote {out}", markup=False)
