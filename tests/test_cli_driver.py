@@ -143,6 +143,12 @@ def test_a_wrong_sign_is_told_when_foretelling_and_comparing(laps: Path, tmp_pat
     assert "none of these" in ran("driver", "compare", laps / "anna2.csv", *known, "--names", wrong)
 
 
+def test_a_driver_of_a_leaking_protocol_says_so_when_he_foretells(laps: Path, tmp_path: Path) -> None:
+    driver, words = tmp_path / "anna.driver", ("--model", "ridge", "--protocol", "paper2019")
+    ran("driver", "fit", laps / "anna.csv", *names(laps), *words, "-o", driver)
+    assert "leak: " in ran("driver", "predict", driver, laps / "anna2.csv", *names(laps), "-o", tmp_path / "out.csv")
+
+
 def test_both_protocols_are_asked_for_the_same_horizon(laps: Path) -> None:
     words = (laps / "anna.csv", *names(laps), "--model", "ridge", "--json", "--both")
     near, far = (json.loads(ran("driver", "evaluate", *words, "--horizon", h)) for h in ("0.2", "1"))

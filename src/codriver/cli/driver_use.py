@@ -47,7 +47,8 @@ def predict(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT", help="Result: .parquet, .csv or .mf4.", show_default=False)],
     dbc: Dbc = None, names: Names = None, bus: Bus = None, vehicle: VehicleName = None, json: Json = False,
 ) -> None:  # fmt: skip
-    """Foretell a drive's torque, row by row, with a 95 % band; each row knows its past and the road ahead only.
+    """Foretell a drive's torque, row by row, with a 95 % band; each row knows its past and the road ahead only
+    (not under the paper2019 protocol, and it says so).
 
     Example: codriver driver predict anna.driver friday.csv --names names.toml -o foretold.parquet
     """
@@ -79,8 +80,11 @@ def predict(
         "rmse_Nm": float(np.sqrt(np.mean(error**2))) if error.size else None,
         "stays_rmse_Nm": float(np.sqrt(np.mean((made.measured - made.last)[there] ** 2))) if error.size else None,
         "inside95": float(np.mean(((made.measured >= made.low) & (made.measured <= made.high))[there])) if error.size else None,
-        "findings": [{"severity": f.severity, "text": f.text} for f in doubts_of(known, made)], "notes": notes,
-        "result": str(out),
+        "findings": [
+            *({"severity": "bad", "text": f"leak: {leak}"} for leak in known.protocol.leaks),
+            *({"severity": f.severity, "text": f.text} for f in doubts_of(known, made)),
+        ],
+        "notes": notes, "result": str(out),
     }  # fmt: skip
     if json:
         typer.echo(json_module.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))

@@ -170,7 +170,7 @@ def _errors(driver: LearnedDriver) -> Chart:
     edges = np.linspace(-6, 6, 61)
     factor = np.sqrt(driver.calibration.nu / (driver.calibration.nu - 2))
     z = held.error / held.sd * factor
-    assumed = f"what the band assumes (Student, nu = {driver.calibration.nu:.1f})"
+    assumed = f"the band's, nu = {driver.calibration.nu:.1f}"
     density, _ = np.histogram(np.clip(z, -6, 6), edges, density=True)
     middle = (edges[1:] + edges[:-1]) / 2
     return Chart(
@@ -178,7 +178,7 @@ def _errors(driver: LearnedDriver) -> Chart:
             Curve("held-out errors", middle, density, GREY, "bars"),
             Curve(assumed, middle, t.pdf(middle, driver.calibration.nu), "#C84C00"),
         ), 220),),
-        "The grey bars should follow the line; then the band holds what it promises.", half=True,
+        "The grey bars should follow the line, a Student distribution; then the band holds what it promises.", half=True,
     )  # fmt: skip
 
 

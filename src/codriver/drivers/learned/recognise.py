@@ -116,5 +116,7 @@ def _refuse_unlike(drivers: Sequence[LearnedDriver]) -> None:
         for d in drivers
     }
     if len(asked) > 1:
-        what = "; ".join(f"{d.name}: {d.target} {d.protocol.features.horizon:g} s ahead" for d in drivers)
+        what = "; ".join(
+            f"{d.name}: {d.target} {d.protocol.features.horizon:g} s ahead, {d.protocol.name}" for d in drivers
+        )
         raise UsageError(f"drivers that foretell different things ({what})", "the same for all", "fit them alike")
