@@ -143,6 +143,13 @@ def test_a_wrong_sign_is_told_when_foretelling_and_comparing(laps: Path, tmp_pat
     assert "none of these" in ran("driver", "compare", laps / "anna2.csv", *known, "--names", wrong)
 
 
+def test_a_name_is_shown_as_it_is(laps: Path, tmp_path: Path) -> None:
+    driver = tmp_path / "anna.driver"
+    ran("driver", "fit", laps / "anna.csv", *names(laps), "--model", "pwc", "--name", "anna [/b] [x]", "-o", driver)
+    said = ran("driver", "predict", driver, laps / "anna2.csv", *names(laps), "-o", tmp_path / "out.csv")
+    assert "anna [/b] [x] (pwc) on" in said
+
+
 def test_a_driver_of_a_leaking_protocol_says_so_when_he_foretells(laps: Path, tmp_path: Path) -> None:
     driver, words = tmp_path / "anna.driver", ("--model", "ridge", "--protocol", "paper2019")
     ran("driver", "fit", laps / "anna.csv", *names(laps), *words, "-o", driver)

@@ -53,6 +53,7 @@ def predict(
     Example: codriver driver predict anna.driver friday.csv --names names.toml -o foretold.parquet
     """
     import numpy as np
+    from rich.markup import escape
 
     from codriver.cli.estimate import refuse_recording
     from codriver.cli.terminal import console, say_findings, working
@@ -91,7 +92,7 @@ def predict(
         return
     said = console()
     said.print(
-        f"[bold]{known.name}[/] ({known.kind}) on {drive.name}: {made.time.size} rows, {made.horizon:g} s ahead",
+        f"[bold]{escape(known.name)}[/] ({known.kind}) on {escape(drive.name)}: {made.time.size} rows, {made.horizon:g} s ahead",
         markup=True,
     )
     if error.size:
