@@ -99,13 +99,23 @@ def _check_outputs(out: Path, report: Path | None, log: Path) -> None:
     Raises:
         UsageError: they cannot, or the result would replace the recording.
     """
-    from codriver.errors import UsageError
     from codriver.logs.write import check_output
 
     check_output(out)
-    if out.exists() and out.samefile(log):
-        raise UsageError(f"-o {out} is the recording itself", "another name", "choose another -o; recordings are kept")
+    refuse_recording(out, log)
     check_report(report)
+
+
+def refuse_recording(out: Path, log: Path) -> None:
+    """Keep a result from replacing the recording that it is made of.
+
+    Raises:
+        UsageError: it would.
+    """
+    from codriver.errors import UsageError
+
+    if out.exists() and log.exists() and out.samefile(log):
+        raise UsageError(f"-o {out} is the recording itself", "another name", "choose another -o; recordings are kept")
 
 
 def check_report(report: Path | None) -> None:
