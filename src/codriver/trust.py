@@ -182,7 +182,9 @@ def _rows(
         return [Finding("warn", "cannot be judged: no innovations among the outputs")] if there else []
     findings = []
     for row in rows:
-        findings += _row(row, valid, grid, ell, nis, lean)
+        # A sensor that the observer can do without, and that the log does not have.
+        if row.used.any() or np.isfinite(grid.values.get(row.row, np.zeros(1))).any():
+            findings += _row(row, valid, grid, ell, nis, lean)
     for output in outputs:
         if output.role == "innovation" and output.name not in values:
             findings.append(

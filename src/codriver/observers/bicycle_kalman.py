@@ -191,7 +191,7 @@ def bicycle_kalman(
             e = select(fresh, value - predict_mean(x, [row])[0], 0.0)
             x, P, s = update_row(x, P, row, e, R, fresh)
             if name in SENSED:
-                out |= {f"{name}_innovation": e, f"{name}_innovation_sd": sqrt(s)}
+                out |= {f"{name}_innovation": e, f"{name}_innovation_sd": sqrt(s), f"{name}_used": fresh}
         x = [select(active, select(a > MOST, MOST, select(a < -MOST, -MOST, a)), 0.0) for a in x]
         variances = [select(P[i][i] > 0, P[i][i], 0.0) for i in range(n)]
         told, unseen = noise.share * x[0], (noise.bias / matrices.g) * v
@@ -241,6 +241,7 @@ def _outputs(low: float, high: float) -> tuple[Output, ...]:
         outputs += [
             Output(f"{name}_innovation", unit, "innovation", f"{name} less predicted; 0 where none arrived"),
             Output(f"{name}_innovation_sd", unit, "innovation_sd", f"standard deviation of {name}_innovation"),
+            Output(f"{name}_used", "1", "flag", f"1 where a value of {name} was used"),
         ]
     return (
         *outputs,
