@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from math import cos
 
@@ -10,6 +14,8 @@ import pytest
 from scipy.linalg import expm
 
 import codriver as cd
+from codriver.cli import main
+from codriver.export import export_c
 from codriver.models import BicycleParameters, bicycle_matrices
 from codriver.models.bicycle import bicycle_lpv
 from codriver.observers import best, build
@@ -218,6 +224,47 @@ def test_chosen_for_bicycles_only():
     assert best((*signals, "yaw_rate"), None, family="motorcycle").estimator == "motorcycle-imu"
     assert build("bicycle-kalman", "pasma2024").settings["friction"] == 0.384
     assert build("bicycle-kalman", "moore2012").settings["friction"] == 0
+
+
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_exported(real, tmp_path):
+    """The C answers as codriver does: its own check, in double bit for bit, in float within its tolerance."""
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    export_c(cd.compile(build("bicycle-kalman", "pasma2024", dt=DT)), tmp_path, real)
+    sources = sorted(tmp_path.glob("*.c"))
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off"]
+    subprocess.run(["gcc", *strict, *sources, "-o", tmp_path / "check", "-lm"], check=True)
+    ran = subprocess.run([tmp_path / "check"], capture_output=True, text=True)
+    assert ran.stdout.startswith("ok: 400 rows"), ran.stdout
+
+
+def told(monkeypatch, capsys, *arguments: str) -> dict:
+    """What `codriver estimate motorcycle` says."""
+    monkeypatch.setattr(sys, "argv", ["codriver", "estimate", "motorcycle", *arguments, "--json"])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert not end.value.code
+    return json.loads(capsys.readouterr().out)
+
+
+def test_command_line(benchmark, monkeypatch, capsys, tmp_path):
+    """A ride as CSV, without the yaw rate: the estimator is found by the vehicle, and a sensor that is not there is not judged."""
+    log, truth = balanced(benchmark, 20.0)
+    names = ("steer_angle", "roll_rate", SPEED)
+    table = np.column_stack([log["steer_angle"].time, *(log[name].values for name in names)])
+    np.savetxt(tmp_path / "ride.csv", table, delimiter=",", header=",".join(["time", *names]), comments="")
+    out, report = tmp_path / "out.csv", tmp_path / "ride.html"
+    given = [str(tmp_path / "ride.csv"), "--vehicle", "meijaard2007", "-o", str(out), "--report", str(report)]
+    said = json.dumps(told(monkeypatch, capsys, *given))
+    assert "bicycle-kalman" in said
+    assert "yaw_rate:" not in said
+    found = cd.read(out)
+    assert rms(found["roll_angle"].values - truth["roll_angle"]) < 3 * DEGREE
+    assert "rider_torque" in found
+    page = report.read_text(encoding="utf-8")
+    assert "Lean of the machine" in page
+    assert "Torque of the rider on the handlebar" in page
 
 
 def judged(log: cd.Log, vehicle: str, dt: float) -> dict[str, float]:
