@@ -259,6 +259,7 @@ def test_command_line(benchmark, monkeypatch, capsys, tmp_path):
     said = json.dumps(told(monkeypatch, capsys, *given))
     assert "bicycle-kalman" in said
     assert "yaw_rate:" not in said
+    assert "no yaw rate for 100% of the valid time" in said
     found = cd.read(out)
     assert rms(found["roll_angle"].values - truth["roll_angle"]) < 3 * DEGREE
     assert "rider_torque" in found
