@@ -16,7 +16,7 @@ from codriver.identify.driver_dual_ekf import DualTuning, dual_ekf
 from codriver.identify.driver_fit import ASKED
 from codriver.identify.driver_record import driver_record
 from codriver.models.two_point import TwoPointDriver
-from codriver.papers.drivers2019.identified import START, TRUTH
+from codriver.papers.drivers2019.figure_15 import START, TRUTH
 from codriver.run import estimate_log
 from codriver.signals import Log, Signal
 from codriver.simulate.circuit import CircuitSetting, simulate_circuit
@@ -30,7 +30,8 @@ CARLA = CIRCUIT_DRIVERS["carla"]
 def say(what: str, fit: DriverFit, truth: TwoPointDriver) -> None:
     """Values with standard errors over the truth."""
     told = ", ".join(
-        f"{p.letter} {p.value:.4g} ± {p.sd:.2g} ({p.value / getattr(truth, p.name):.2f})" for p in fit.parameters.values()
+        f"{p.letter} {p.value:.4g} ± {p.sd:.2g} ({p.value / getattr(truth, p.name):.2f})"
+        for p in fit.parameters.values()
     )
     print(f"{what}: {fit.explained:.4f} explained; {told}", flush=True)
 
@@ -59,7 +60,9 @@ def torque() -> None:
     for what, vehicle in (("as it is", car), ("without friction", car.with_parameter("steering_friction", 0.0))):
         estimate = estimate_log("driver-torque", blind, vehicle)
         found = estimate["driver_torque"]
-        label = Signal("driver_torque", found.time, np.where(estimate.valid, found.values, np.nan), found.unit, "estimate")
+        label = Signal(
+            "driver_torque", found.time, np.where(estimate.valid, found.values, np.nan), found.unit, "estimate"
+        )
         say(f"column {what}", identify_driver(blind.with_signals(label)), TwoPointDriver())
 
 
@@ -68,7 +71,11 @@ def dual() -> None:
     record = driver_record(simulate_circuit(CircuitSetting(laps=1), seed=1).log(), TRUTH.near, TRUTH.far)
     for doubt in (1.0, 2.0, 4.0, 8.0):
         ends = dual_ekf(record, START, ASKED, DualTuning(doubt=doubt, spread=0.5)).last()
-        print(f"doubt {doubt:g} N m:", ", ".join(f"{n} {v / getattr(TRUTH, n):.2f}" for n, (v, _) in ends.items()), flush=True)
+        print(
+            f"doubt {doubt:g} N m:",
+            ", ".join(f"{n} {v / getattr(TRUTH, n):.2f}" for n, (v, _) in ends.items()),
+            flush=True,
+        )
 
 
 def main() -> None:
