@@ -79,6 +79,7 @@ _ENTRIES = (
     Quantity("latitude", "deg", "deg", "lat", "north positive", -90, 90),
     Quantity("longitude", "deg", "deg", "lon", "east positive", -180, 180),
     Quantity("altitude", "m", "m", "h", "height above sea level", -500, 9000),
+    Quantity("pitching", "rad/s", "deg/s", "theta'", "pitch rate of a leaning machine beside that of its turn", -3, 3),
     # what the person does
     Quantity(
         "accelerator_pedal", "1", "%", "p_r", "accelerator pedal position, 0 released to 1 fully pressed", -0.02, 1.02
