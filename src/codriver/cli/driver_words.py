@@ -22,14 +22,16 @@ def driver_told(
         "target": driver.target, "signals": list(driver.signals), "left_out": list(driver.left_out),
         "features": len(driver.features), "horizon_s": setting.horizon, **driver.training,
         "parameters": {k: v for k, v in driver.regressor.get_params(deep=False).items() if isinstance(v, int | float | str)},
-        "leaks": list(driver.protocol.leaks), "notes": list(notes), "band_scale": driver.calibration.scale,
+        "leaks": list(driver.protocol.leaks),
+        "findings": [{"severity": f.severity, "text": f.text} for f in driver.doubts],
+        "notes": list(notes), "band_scale": driver.calibration.scale,
         "band_nu": driver.calibration.nu, "result": str(out), "report": str(report) if report is not None else None,
     }  # fmt: skip
 
 
 def say_driver(told: dict[str, Any]) -> None:
     """Show it."""
-    from codriver.cli.terminal import console
+    from codriver.cli.terminal import console, say_findings
 
     out = console()
     out.print(
@@ -45,6 +47,7 @@ def say_driver(told: dict[str, Any]) -> None:
             f"{told['held_out_stays_rmse']:.3f}), {told['held_out_inside95']:.0%} in the 95 % band",
             markup=False,
         )
+    say_findings(out, told["findings"])
     for note in told["notes"]:
         out.print(f"  note {note}", markup=False)
     for leak in told["leaks"]:

@@ -85,10 +85,9 @@ def driver_document(driver: LearnedDriver, drives: Mapping[str, Log], command: s
         parts += [_foretold(driver.held), _errors(driver)]
     training, setting = driver.training, driver.protocol.features
     sections = [Section("Foretold on blocks held out in turn", tuple(parts))] if parts else []
-    if driver.protocol.leaks:
-        sections.insert(
-            0, Section("Warnings", (Findings(tuple(("bad", f"leak: {t}") for t in driver.protocol.leaks)),))
-        )
+    warned = [(f.severity, f.text) for f in driver.doubts] + [("bad", f"leak: {t}") for t in driver.protocol.leaks]
+    if warned:
+        sections.insert(0, Section("Warnings", (Findings(tuple(warned)),)))
     sections.append(Section("Features", (_features(driver),)))
     rmse = training.get("held_out_rmse", float("nan"))
     return Document(

@@ -10,12 +10,13 @@ over its standard error.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from codriver.drivers.learned.drive_doubts import doubts_about
 from codriver.drivers.learned.features import FeatureTable, Index, features_of
 from codriver.drivers.learned.kinds import BASELINES, DEFAULT
 from codriver.drivers.learned.learned_driver import fit_table
@@ -67,6 +68,7 @@ class Evaluation:
         left_out: signals that the drives lack.
         target: the torque's name.
         estimated: whether that is an estimate from the wheel's angle.
+        doubts: whether the drives can be judged together.
     """
 
     protocol: Protocol
@@ -76,6 +78,7 @@ class Evaluation:
     left_out: tuple[str, ...]
     target: str
     estimated: bool = False
+    doubts: tuple[Finding, ...] = ()
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -100,7 +103,7 @@ class Evaluation:
 
     def verdict(self, kind: str = DEFAULT) -> list[Finding]:
         """What can be said of a kind against the baselines, and of the protocol."""
-        found = [Finding("bad", f"leak: {text}") for text in self.protocol.leaks]
+        found = [*self.doubts, *(Finding("bad", f"leak: {text}") for text in self.protocol.leaks)]
         if self.estimated:
             worse = self.protocol.features.current != ()
             said = "the torque is itself an estimate from the wheel's angle" + (
@@ -153,10 +156,11 @@ def evaluate(
     protocol = protocol or Protocol()
     refuse_twice(drives)
     table = features_of(list(drives.values()), protocol.features)
-    return evaluate_table(
+    judged = evaluate_table(
         table, folds_of(table, protocol, tuple(drives)), kinds, protocol=protocol, options=options, calibrate=calibrate,
         progress=progress,
     )  # fmt: skip
+    return replace(judged, doubts=tuple(doubts_about(drives, table.target, protocol.features.tick)))
 
 
 def evaluate_table(
