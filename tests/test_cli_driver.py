@@ -50,7 +50,10 @@ def test_from_drives_to_a_driver_to_torques_foretold(laps: Path, tmp_path: Path)
     assert "How anna steers" in page
     assert "learnt from" in page
     out = tmp_path / "foretold.parquet"
+    own = json.loads(ran("driver", "predict", driver, laps / "anna.csv", *names(laps), "-o", out, "--json"))
+    assert ["one that anna learnt from" in found["text"] for found in own["findings"]] == [True]
     told = json.loads(ran("driver", "predict", driver, laps / "anna2.csv", *names(laps), "-o", out, "--json"))
+    assert told["findings"] == []
     table = pq.read_table(out)
     assert table.num_rows == told["rows"]
     mean, then = (table[name].to_numpy() for name in ("driver_torque_ahead", "driver_torque_then"))
@@ -83,7 +86,11 @@ def test_compare_names_the_driver(laps: Path, tmp_path: Path) -> None:
     told = json.loads(ran("driver", "compare", laps / "anna2.csv", *stored, *names(laps), "--json"))
     assert [one["name"] for one in told["drivers"]] == ["anna", "carla"]
     assert sum(one["share"] for one in told["drivers"]) == pytest.approx(1)
+    assert told["findings"] == []
     assert "anna" in ran("driver", "compare", laps / "anna2.csv", *stored, *names(laps)).splitlines()[0]
+    assert "one that anna learnt from" in ran("driver", "compare", laps / "anna.csv", *stored, *names(laps)).replace(
+        "\n", " "
+    )
 
 
 def test_export_writes_c(laps: Path, tmp_path: Path) -> None:

@@ -20,7 +20,8 @@ def driver_told(
     return {
         "name": driver.name, "model": driver.kind, "logs": list(drives), "protocol": driver.protocol.name,
         "target": driver.target, "signals": list(driver.signals), "left_out": list(driver.left_out),
-        "features": len(driver.features), "horizon_s": setting.horizon, **driver.training,
+        "features": len(driver.features), "horizon_s": setting.horizon,
+        **{name: value for name, value in driver.training.items() if name != "prints"},
         "parameters": {k: v for k, v in driver.regressor.get_params(deep=False).items() if isinstance(v, int | float | str)},
         "leaks": list(driver.protocol.leaks),
         "findings": [{"severity": f.severity, "text": f.text} for f in driver.doubts],
@@ -130,7 +131,7 @@ def say_likeness(told: dict[str, Any]) -> None:
     """Show which driver a drive is."""
     from rich.table import Table
 
-    from codriver.cli.terminal import console
+    from codriver.cli.terminal import console, say_findings
 
     out = console()
     best = told["drivers"][0]
@@ -147,5 +148,6 @@ def say_likeness(told: dict[str, Any]) -> None:
             f"{one['rmse']:.3f}", f"{one['inside95']:.0%}",
         )  # fmt: skip
     out.print(table)
+    say_findings(out, told["findings"])
     for note in told["notes"]:
         out.print(f"note {note}", markup=False)

@@ -17,6 +17,7 @@ import numpy as np
 from codriver.drivers.learned.calibration import Calibration
 from codriver.drivers.learned.drive_doubts import doubts_about
 from codriver.drivers.learned.features import Feature, FeatureTable, Index, features_of
+from codriver.drivers.learned.fingerprint import fingerprint
 from codriver.drivers.learned.kinds import DEFAULT, regressor_of
 from codriver.drivers.learned.protocol import Fold, Protocol, time_blocks
 from codriver.drivers.learned.regressor import TorqueRegressor
@@ -77,7 +78,8 @@ class LearnedDriver:
         scaling: of features and torque.
         regressor: what was learnt.
         calibration: of its bands.
-        training: what it was learnt from: drives, rows, seconds, spread of the torque; RMSE and coverage on held-out blocks.
+        training: what it was learnt from: drives and their prints, rows, minutes, size of the torque and whether that was
+            estimated; RMSE and coverage on held-out blocks.
         left_out: signals that the drives lack.
         held: what was foretold on blocks held out in turn, each by a model that had not seen it; not kept in a file.
         doubts: whether the drives can be learnt from; not kept in a file.
@@ -164,7 +166,11 @@ def fit_driver(
     refuse_twice(named)
     table = features_of(list(named.values()), protocol.features)
     driver = fit_table(table, kind, name=name, protocol=protocol, options=options)
-    return replace(driver, doubts=tuple(doubts_about(named, table.target, protocol.features.tick)))
+    prints = [fingerprint(log[table.target]) for log in named.values()]
+    return replace(
+        driver, training={**driver.training, "prints": prints},
+        doubts=tuple(doubts_about(named, table.target, protocol.features.tick)),
+    )  # fmt: skip
 
 
 def _named(drives: Log | Sequence[Log] | Mapping[str, Log]) -> dict[str, Log]:
@@ -216,7 +222,7 @@ def fit_table(
     tick = protocol.features.tick if protocol.features.dense else protocol.features.dt
     training = {
         "drives": int(np.unique(table.drive).size), "rows": len(table), "minutes": len(table) * tick / 60,
-        "torque_rms": float(np.sqrt(np.mean(table.y**2))),
+        "torque_rms": float(np.sqrt(np.mean(table.y**2))), "estimated": table.estimated,
     }  # fmt: skip
     if held is not None:
         inside = (held.measured >= held.low) & (held.measured <= held.high)
