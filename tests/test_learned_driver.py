@@ -96,6 +96,32 @@ def test_an_edited_file_is_refused_and_not_foretold_with(place, value, said: str
         parse_driver(json.dumps(whole), "x.driver")
 
 
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("protocol", "features", "horizon"), 0.4), (("name",), "ben"), (("calibration", "scale"), 0.5),
+        (("model", "state", "offset"), 0.25), (("checksum",), "0"), (("more",), 1),
+    ],
+)  # fmt: skip
+def test_what_only_a_checksum_can_tell_is_refused_too(place, value) -> None:
+    whole = json.loads(driver_text(small("ridge")))
+    inner = whole
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = value
+    with pytest.raises(FormatError, match="edited after it was learnt"):
+        parse_driver(json.dumps(whole), "x.driver")
+
+
+def test_a_file_without_a_checksum_or_written_in_another_order_is_read() -> None:
+    driver = small("ridge")
+    whole = json.loads(driver_text(driver))
+    reordered = json.dumps(dict(reversed(whole.items())), indent=4)
+    del whole["checksum"]
+    for text in (reordered, json.dumps(whole)):
+        assert parse_driver(text, "x.driver").features == driver.features
+
+
 def with_road_ahead(log: Log, driver: LearnedDriver) -> Log:
     """The log with the road ahead as a map would give it, on the driver's tick."""
     setting = driver.protocol.features
