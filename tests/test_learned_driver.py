@@ -20,7 +20,7 @@ from codriver.drivers.learned.learned_driver import LearnedDriver, fit_driver, f
 from codriver.drivers.learned.prepare import prepared
 from codriver.drivers.learned.protocol import PROTOCOLS, Protocol, time_blocks
 from codriver.drivers.learned.recognise import recognise
-from codriver.drivers.learned.road_ahead import curvature_ahead
+from codriver.drivers.learned.road_ahead import with_road_ahead
 from codriver.errors import DesignError, FormatError, LogError, MissingSignal, UsageError
 from codriver.export import export_c
 from codriver.program import compile as compile_observer
@@ -122,23 +122,10 @@ def test_a_file_without_a_checksum_or_written_in_another_order_is_read() -> None
         assert parse_driver(text, "x.driver").features == driver.features
 
 
-def with_road_ahead(log: Log, driver: LearnedDriver) -> Log:
-    """The log with the road ahead as a map would give it, on the driver's tick."""
-    setting = driver.protocol.features
-    grid = log.sample(["road_curvature", "longitudinal_speed"], setting.tick)
-    ahead = curvature_ahead(
-        grid.values["road_curvature"], grid.values["longitudinal_speed"], setting.tick, setting.previews
-    )
-    signals = [
-        Signal(f"road_curvature_ahead_{k + 1}", grid.time, column, "1/m", "map") for k, column in enumerate(ahead.T)
-    ]
-    return log.with_signals(*signals)
-
-
 @pytest.mark.parametrize("kind", STEPPING)
 def test_the_observer_says_what_the_model_says(kind: str) -> None:
     driver = small(kind, Protocol())
-    log = with_road_ahead(driven(seed=2).between(0.0, 60.0), driver)
+    log = with_road_ahead(driven(seed=2).between(0.0, 60.0), driver.protocol.features)
     made = driver.predict(log)
     estimate = compile_observer(observer_of(driver)).run(log, start=log.start)
     valid = estimate.columns["valid"] > 0.5
@@ -147,6 +134,15 @@ def test_the_observer_says_what_the_model_says(kind: str) -> None:
     assert there.mean() > 0.98
     assert np.allclose(estimate.columns["driver_torque_ahead"][rows][there], made.mean[there], rtol=1e-9, atol=1e-9)
     assert np.allclose(estimate.columns["driver_torque_ahead_sd"][rows][there], made.sd[there], rtol=1e-9, atol=1e-9)
+
+
+def test_the_road_ahead_needs_curvature_and_speed_and_is_not_known_beyond_the_end() -> None:
+    with pytest.raises(MissingSignal, match="road_curvature"):
+        with_road_ahead(driven().without("road_curvature"))
+    made = with_road_ahead(driven().between(0.0, 30.0))
+    last = [np.isfinite(made[f"road_curvature_ahead_{k}"].values).sum() for k in (1, 8)]
+    assert last[0] - last[1] == pytest.approx(14, abs=3)  # 1.4 s at ticks of 0.1 s, at a speed that hardly changes
+    assert "road_curvature_ahead_9" not in made
 
 
 def test_the_observer_keeps_the_house_rules() -> None:

@@ -22,6 +22,7 @@ from codriver.drivers.learned.prepare import prepared
 from codriver.drivers.learned.protocol import PROTOCOLS, Protocol, folds_of
 from codriver.drivers.learned.recognise import Likeness, recognise
 from codriver.drivers.learned.regressor import TorqueRegressor
+from codriver.drivers.learned.road_ahead import with_road_ahead
 
 __all__ = [
     "BASELINES",
@@ -52,4 +53,5 @@ __all__ = [
     "recognise",
     "regressor_of",
     "save_driver",
+    "with_road_ahead",
 ]
