@@ -19,10 +19,12 @@ import numpy as np
 from codriver.drivers.learned.drive_doubts import doubts_about
 from codriver.drivers.learned.features import FeatureTable, Index, features_of
 from codriver.drivers.learned.kinds import BASELINES, DEFAULT
-from codriver.drivers.learned.learned_driver import fit_table
+from codriver.drivers.learned.learned_driver import LEAST_ROWS, fit_table
+from codriver.drivers.learned.no_row import rowless
 from codriver.drivers.learned.protocol import Fold, Protocol, folds_of
 from codriver.drivers.learned.scaling import Scaling
 from codriver.drivers.learned.twice import refuse_twice
+from codriver.errors import LogError
 from codriver.finding import Finding
 from codriver.signals import Log
 from codriver.signals.signal import Array
@@ -160,7 +162,9 @@ def evaluate(
         table, folds_of(table, protocol, tuple(drives)), kinds, protocol=protocol, options=options, calibrate=calibrate,
         progress=progress,
     )  # fmt: skip
-    return replace(judged, doubts=tuple(doubts_about(drives, table.target, protocol.features.tick)))
+    setting = protocol.features
+    doubts = (*doubts_about(drives, table.target, setting.tick), *rowless(drives, table, setting))
+    return replace(judged, doubts=doubts)
 
 
 def evaluate_table(
@@ -172,6 +176,7 @@ def evaluate_table(
     every = tuple(dict.fromkeys((*BASELINES, *kinds)))
     scores: dict[str, list[Score]] = {kind: [] for kind in every}
     blocks: dict[str, list[Array]] = {kind: [] for kind in every}
+    _refuse_short(table, folds, protocol)
     for fold in folds:
         train, test = table.take(fold.train), table.take(fold.test)
         spread, stays = float(test.y.std()), float(np.sqrt(np.mean((test.y - test.X[:, test.torque_columns[0]]) ** 2)))
@@ -210,6 +215,24 @@ def evaluate_table(
         table.left_out,
         table.target,
         table.estimated,
+    )
+
+
+def _refuse_short(table: FeatureTable, folds: Sequence[Fold], protocol: Protocol) -> None:
+    """Raise unless every fold leaves enough to learn from.
+
+    Raises:
+        LogError: the parts held out, and the gaps beside them, leave too little.
+    """
+    fold = min(folds, key=lambda f: f.train.size, default=None)
+    if fold is None or fold.train.size >= LEAST_ROWS:
+        return
+    gaps = len(table) - fold.train.size - fold.test.size
+    taken = f"; the part itself takes {fold.test.size}" + (f", the gaps beside it {gaps}" if gaps else "")
+    raise LogError(
+        f"{fold.train.size} of {len(table)} usable rows to learn from when {fold.name} is held out{taken}",
+        f"{LEAST_ROWS} rows or more",
+        f"give longer drives, or more of them (gaps of {protocol.gap:g} s keep neighbours apart)",
     )
 
 

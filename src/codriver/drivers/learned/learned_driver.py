@@ -19,6 +19,7 @@ from codriver.drivers.learned.drive_doubts import doubts_about
 from codriver.drivers.learned.features import Feature, FeatureTable, Index, features_of
 from codriver.drivers.learned.fingerprint import fingerprint
 from codriver.drivers.learned.kinds import DEFAULT, regressor_of
+from codriver.drivers.learned.no_row import rowless
 from codriver.drivers.learned.protocol import Fold, Protocol, time_blocks
 from codriver.drivers.learned.regressor import TorqueRegressor
 from codriver.drivers.learned.scaling import Scaling
@@ -169,7 +170,7 @@ def fit_driver(
     prints = [fingerprint(log[table.target]) for log in named.values()]
     return replace(
         driver, training={**driver.training, "prints": prints},
-        doubts=tuple(doubts_about(named, table.target, protocol.features.tick)),
+        doubts=(*doubts_about(named, table.target, protocol.features.tick), *rowless(named, table, protocol.features)),
     )  # fmt: skip
 
 
