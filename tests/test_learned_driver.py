@@ -213,6 +213,19 @@ def test_a_leaking_protocol_is_said_in_the_verdict() -> None:
     assert not any("leak" in f.text for f in honest.verdict("ridge"))
 
 
+def test_leaks_name_what_the_drives_hold_only() -> None:
+    log = driven().without("sideslip_angle", "yaw_rate")
+    protocol = PROTOCOLS["paper2019"]
+    judged = evaluate({"a": log}, ["pwc"], protocol=protocol, calibrate=False)
+    driver = fit_driver(log, "pwc", protocol=protocol)
+    for leaks in (judged.leaks, driver.leaks):
+        assert "the features hold steering_wheel_angle at the very moment" in leaks[0]
+        assert len(leaks) == len(protocol.leaks)
+    bare = protocol.leaks_without(("sideslip_angle", "yaw_rate", "steering_wheel_angle"))
+    assert not any("inverse dynamics" in leak for leak in bare)
+    assert len(bare) == len(protocol.leaks) - 1
+
+
 def test_a_torque_that_was_estimated_is_said_to_be_so() -> None:
     log = driven()
     torque = log["driver_torque"]

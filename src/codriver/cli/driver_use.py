@@ -86,7 +86,7 @@ def predict(
         "stays_rmse_Nm": float(np.sqrt(np.mean((made.measured - made.last)[there] ** 2))) if error.size else None,
         "inside95": float(np.mean(((made.measured >= made.low) & (made.measured <= made.high))[there])) if error.size else None,
         "findings": [
-            *({"severity": "bad", "text": f"leak: {leak}"} for leak in known.protocol.leaks),
+            *({"severity": "bad", "text": f"leak: {leak}"} for leak in known.leaks),
             *({"severity": f.severity, "text": f.text} for f in (*unfair(known, log), *doubts_of(known, made))),
         ],
         "notes": notes, "result": str(out),

@@ -23,7 +23,7 @@ def driver_told(
         "features": len(driver.features), "horizon_s": setting.horizon,
         **{name: value for name, value in driver.training.items() if name != "prints"},
         "parameters": {k: v for k, v in driver.regressor.get_params(deep=False).items() if isinstance(v, int | float | str)},
-        "leaks": list(driver.protocol.leaks),
+        "leaks": list(driver.leaks),
         "findings": [{"severity": f.severity, "text": f.text} for f in driver.doubts],
         "notes": list(notes), "band_scale": driver.calibration.scale,
         "band_nu": driver.calibration.nu, "result": str(out), "report": str(report) if report is not None else None,
@@ -71,9 +71,9 @@ def evaluation_told(
             for f in dict.fromkeys(f for kind in judged or ["ridge"] for f in first.verdict(kind))
         ]
         + [
-            {"severity": "warn", "text": f"protocol {e.protocol.name} leaks: {leak}"}
+            {"severity": "bad", "text": f"protocol {e.protocol.name} leaks: {leak}"}
             for e in found[1:]
-            for leak in e.protocol.leaks
+            for leak in e.leaks
         ],
         "report": str(report) if report is not None else None,
     }  # fmt: skip

@@ -40,9 +40,7 @@ def evaluation_document(
     first = found[0]
     judged = [k for k in first.kinds if k not in BASELINES] or ["ridge"]
     items = dict.fromkeys((f.severity, f.text) for kind in judged for f in first.verdict(kind))
-    items |= dict.fromkeys(
-        ("warn", f"protocol {e.protocol.name} leaks: {t}") for e in found[1:] for t in e.protocol.leaks
-    )
+    items |= dict.fromkeys(("bad", f"protocol {e.protocol.name} leaks: {t}") for e in found[1:] for t in e.leaks)
     sections = [Section("Verdict", (Findings(tuple(items)), *([" ".join(f"{n}." for n in notes)] if notes else [])))]
     sections += [Section(f"Protocol {e.protocol.name}", protocol_parts(e)) for e in found]
     if len(found) > 1:
@@ -74,7 +72,7 @@ def leak_table(found: Sequence[Evaluation]) -> Table:
     return Table(
         ("model", *(e.protocol.name for e in found)), tuple(rows),
         "RMSE over that of 'the torque stays', under each protocol. Where a protocol leaks, its column is a figure of the protocol "
-        "and not of the model. " + " ".join(f"{e.protocol.name}: {leak}." for e in found for leak in e.protocol.leaks),
+        "and not of the model. " + " ".join(f"{e.protocol.name}: {leak}." for e in found for leak in e.leaks),
     )  # fmt: skip
 
 
@@ -85,7 +83,7 @@ def driver_document(driver: LearnedDriver, drives: Mapping[str, Log], command: s
         parts += [_foretold(driver.held), _errors(driver)]
     training, setting = driver.training, driver.protocol.features
     sections = [Section("Foretold on blocks held out in turn", tuple(parts))] if parts else []
-    warned = [(f.severity, f.text) for f in driver.doubts] + [("bad", f"leak: {t}") for t in driver.protocol.leaks]
+    warned = [(f.severity, f.text) for f in driver.doubts] + [("bad", f"leak: {t}") for t in driver.leaks]
     if warned:
         sections.insert(0, Section("Warnings", (Findings(tuple(warned)),)))
     sections.append(Section("Features", (_features(driver),)))

@@ -87,6 +87,11 @@ class Evaluation:
         """Judged, in order."""
         return tuple(self.scores)
 
+    @property
+    def leaks(self) -> tuple[str, ...]:
+        """Why figures under this protocol flatter on these drives."""
+        return self.protocol.leaks_without(self.left_out)
+
     def mean(self, kind: str, figure: str = "rmse") -> float:
         """A figure's mean over the folds; of squared figures the root of the mean square, over rows."""
         rows = np.array([s.rows for s in self.scores[kind]], dtype=float)
@@ -105,7 +110,7 @@ class Evaluation:
 
     def verdict(self, kind: str = DEFAULT) -> list[Finding]:
         """What can be said of a kind against the baselines, and of the protocol."""
-        found = [*self.doubts, *(Finding("bad", f"leak: {text}") for text in self.protocol.leaks)]
+        found = [*self.doubts, *(Finding("bad", f"leak: {text}") for text in self.leaks)]
         if self.estimated:
             worse = self.protocol.features.current != ()
             said = "the torque is itself an estimate from the wheel's angle" + (

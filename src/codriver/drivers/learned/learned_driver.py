@@ -100,6 +100,11 @@ class LearnedDriver:
     held: TorquePrediction | None = field(default=None, repr=False)
     doubts: tuple[Finding, ...] = ()
 
+    @property
+    def leaks(self) -> tuple[str, ...]:
+        """Why figures under this protocol flatter on these drives."""
+        return self.protocol.leaks_without(self.left_out)
+
     def table(self, log: Log | Sequence[Log], with_target: bool = True) -> FeatureTable:
         """Features of drives as this driver wants them.
 
