@@ -13,7 +13,7 @@ from scipy.stats import norm, t
 from codriver.drivers.learned.calibration import Calibration
 from codriver.drivers.learned.driver_file import driver_text, load_driver, parse_driver, save_driver
 from codriver.drivers.learned.driver_observer import observer_of
-from codriver.drivers.learned.evaluate import block_means, evaluate
+from codriver.drivers.learned.evaluate import _error_of_root, block_means, evaluate
 from codriver.drivers.learned.features import features_of
 from codriver.drivers.learned.kinds import BASELINES, KINDS, class_of
 from codriver.drivers.learned.learned_driver import LearnedDriver, fit_driver, fit_table
@@ -203,6 +203,19 @@ def test_the_baselines_are_in_every_table_and_gains_are_of_blocks() -> None:
     assert mean > 2 * error > 0
     assert judged.gains["pwc", "ridge"] == pytest.approx((-mean, error))
     assert [f.severity for f in judged.verdict("ridge")][:1] == ["ok"]
+    assert (judged.against("ridge", "pwc"), judged.against("pwc", "ridge")) == ("better", "worse")
+    assert judged.lead == "ridge"
+    for score in judged.scores["ridge"]:
+        assert 0.02 < score.rmse_error / score.rmse < 0.5
+
+
+def test_the_standard_error_of_an_rmse_by_drawing() -> None:
+    rng = np.random.default_rng(6)
+    squared = rng.chisquare(20, (4000, 30)) / 20
+    roots = np.sqrt(squared.mean(axis=1))
+    told = [_error_of_root(float(root), row) for root, row in zip(roots, squared, strict=True)]
+    assert np.mean(told) == pytest.approx(roots.std(), rel=0.03)
+    assert np.isnan(_error_of_root(1.0, np.ones(1)))
 
 
 def test_a_leaking_protocol_is_said_in_the_verdict() -> None:

@@ -61,14 +61,13 @@ def evaluation_told(
 ) -> dict[str, Any]:
     """What `driver evaluate` tells."""
     first = found[0]
-    judged = [k for k in first.kinds if k not in ("pwc", "pwl", "ridge")]
     return {
         "drives": list(drives), "target": first.target, "horizon_s": first.protocol.features.horizon,
-        "left_out": list(first.left_out), "notes": list(notes),
+        "left_out": list(first.left_out), "notes": list(notes), "lead": first.lead,
         "protocols": {e.protocol.name: {"folds": [s.fold for s in e.scores["pwc"]], "models": _models(e)} for e in found},
         "findings": [
             {"severity": f.severity, "text": f.text}
-            for f in dict.fromkeys(f for kind in judged or ["ridge"] for f in first.verdict(kind))
+            for f in first.verdict(first.lead)
         ]
         + [
             {"severity": "bad", "text": f"protocol {e.protocol.name} leaks: {leak}"}
@@ -80,13 +79,17 @@ def evaluation_told(
 
 
 def _models(e: Evaluation) -> dict[str, Any]:
+    from codriver.drivers.learned.kinds import BASELINES
+
     made = {}
     for kind in e.kinds:
         spread = e.spread(kind)
         made[kind] = {
             "rmse_Nm": e.mean(kind), "rmse_se_Nm": _finite(spread), "ratio_to_pwc": e.mean(kind, "ratio"),
             "nrmse": _finite(e.mean(kind, "nrmse")), "inside68": e.mean(kind, "inside68"), "inside95": e.mean(kind, "inside95"),
-            "log_density": e.mean(kind, "log_density"), "fit_s": max(s.seconds for s in e.scores[kind]),
+            "log_density": e.mean(kind, "log_density"),
+            "against": {other: e.against(kind, other) for other in BASELINES if other != kind},
+            "fit_s": max(s.seconds for s in e.scores[kind]),
             "folds": [s.rmse for s in e.scores[kind]],
         }  # fmt: skip
     return made
@@ -112,16 +115,30 @@ def say_evaluation(told: dict[str, Any]) -> None:
     for name, one in told["protocols"].items():
         out.print(f"\nprotocol {name}; held out in turn: {', '.join(one['folds'])}\n", markup=False)
         table = Table(box=None, pad_edge=False)
-        for column in ("model", "RMSE, N m", "+-", "of pwc", "in 68 %", "in 95 %", "log density", "fit, s"):
-            table.add_column(column, justify="left" if column == "model" else "right")
+        for column in (
+            "model",
+            "RMSE, N m",
+            "+-",
+            "of pwc",
+            "in 68 %",
+            "in 95 %",
+            "log density",
+            "fit, s",
+            "vs pwc",
+            "vs ridge",
+        ):
+            left = column in ("model", "vs pwc", "vs ridge")
+            table.add_column(column, justify="left" if left else "right", no_wrap=True)
         for kind, row in one["models"].items():
             spread = f"{row['rmse_se_Nm']:.3f}" if row["rmse_se_Nm"] is not None else "-"
             table.add_row(
                 kind, f"{row['rmse_Nm']:.4f}", spread, f"{row['ratio_to_pwc']:.3f}", f"{row['inside68']:.0%}",
                 f"{row['inside95']:.0%}", f"{row['log_density']:.3f}", f"{row['fit_s']:.1f}",
+                *(row["against"].get(other, "-").replace("not told apart", "~") for other in ("pwc", "ridge")),
             )  # fmt: skip
         out.print(table)
-    out.print("\n[bold]verdict[/]:")
+    out.print("vs: whether the gain is beyond two standard errors over blocks of 10 s; ~ cannot be told", markup=False)
+    out.print(f"\n[bold]verdict on {told['lead']}[/]:")
     say_findings(out, told["findings"])
     if told["report"]:
         out.print(f"\nwrote {told['report']}", markup=False)

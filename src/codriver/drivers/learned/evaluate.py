@@ -44,6 +44,7 @@ class Score:
         log_density: mean.
         rows: judged.
         seconds: that fitting took, calibration included.
+        rmse_error: standard error of rmse, N m, from the scatter over blocks of 10 s; NaN with one block.
     """
 
     kind: str
@@ -56,6 +57,7 @@ class Score:
     log_density: float
     rows: int
     seconds: float
+    rmse_error: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +110,17 @@ class Evaluation:
         values = np.array([getattr(s, figure) for s in self.scores[kind]])
         return float(values.std(ddof=1) / np.sqrt(values.size)) if values.size > 1 else float("nan")
 
+    @property
+    def lead(self) -> str:
+        """The kind that the verdict is on: the default, or the first beside the baselines, or ridge."""
+        judged = [kind for kind in self.kinds if kind not in BASELINES]
+        return DEFAULT if DEFAULT in judged else judged[0] if judged else "ridge"
+
+    def against(self, kind: str, other: str) -> str:
+        """Whether the gain over another is beyond two standard errors: "better", "worse" or "not told apart"."""
+        mean, error = self.gains[kind, other]
+        return "better" if mean > 2 * error else "worse" if mean < -2 * error else "not told apart"
+
     def verdict(self, kind: str = DEFAULT) -> list[Finding]:
         """What can be said of a kind against the baselines, and of the protocol."""
         found = [*self.doubts, *(Finding("bad", f"leak: {text}") for text in self.leaks)]
@@ -130,12 +143,12 @@ class Evaluation:
         return found
 
     def _against(self, kind: str, other: str) -> Finding:
-        mean, error = self.gains[kind, other]
         ratio = self.mean(kind) / self.mean(other)
         said = f"RMSE {ratio:.3f} times that of {other}"
-        if mean > 2 * error:
+        found = self.against(kind, other)
+        if found == "better":
             return Finding("ok", f"{kind} beats {other}: {said}")
-        if mean < -2 * error:
+        if found == "worse":
             return Finding("bad", f"{kind} is worse than {other}: {said}; take {other} here")
         return Finding("warn", f"{kind} against {other}: {said}, which these drives cannot tell from 1")
 
@@ -197,15 +210,15 @@ def evaluate_table(
             made = driver.predict_table(test)
             error, own = made.error, made.sd
             half = {p: (made.high - made.mean) * _over(driver.calibration, p) for p in (0.68, 0.95)}
-            rmse = float(np.sqrt(np.mean(error**2)))
+            rmse, squared = float(np.sqrt(np.mean(error**2))), block_means(error**2, made.time, test.drive)
             scores[kind].append(
                 Score(
                     kind, fold.name, rmse, _over_size(rmse, spread), _over_size(rmse, stays),
                     float(np.mean(np.abs(error) <= half[0.68])), float(np.mean(np.abs(error) <= half[0.95])),
-                    float(np.mean(made.log_density)), own.size, seconds,
+                    float(np.mean(made.log_density)), own.size, seconds, _error_of_root(rmse, squared),
                 )
             )  # fmt: skip
-            blocks[kind].append(block_means(error**2, made.time, test.drive))
+            blocks[kind].append(squared)
     gains = {}
     for kind in every:
         for other in every:
@@ -252,6 +265,13 @@ def block_means(values: Array, time: Array, drive: Index, length: float = BLOCK)
         full = count >= 0.5 * np.median(count[count > 0])
         found.append(sums[full] / count[full])
     return np.concatenate(found)
+
+
+def _error_of_root(rmse: float, squared: Array) -> float:
+    """Standard error of an RMSE from mean squares over blocks: that of the mean square, over 2 RMSE."""
+    if squared.size < 2 or not rmse > 0:
+        return float("nan")
+    return float(squared.std(ddof=1) / np.sqrt(squared.size) / (2 * rmse))
 
 
 def _over_size(error: float, size: float) -> float:
