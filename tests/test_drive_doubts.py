@@ -87,6 +87,9 @@ def test_a_slow_torque_repeated_on_quick_rows_is_told() -> None:
 def test_a_coarse_torque_is_not_taken_for_a_slow_one() -> None:
     torque = driven()["driver_torque"]
     assert told(monday=driven().with_signals(replace(torque, values=np.round(torque.values, 1)))) == []
+    calm = replace(torque, values=np.round(0.5 * np.sin(0.31 * torque.time) + 0.5 * np.sin(0.17 * torque.time), 1))
+    assert np.quantile(time_between_changes(calm), 0.1) > 0.15
+    assert told(monday=driven().with_signals(calm)) == []
 
 
 def test_correlation_and_changes_by_hand() -> None:

@@ -2,10 +2,10 @@
 
     size     rms(T) > 30 N m, or 20 times that of another drive        a wrong unit: a driver's arms do not do that for minutes
     sign     corr(T, angle) of two drives beyond 0.4 and opposite      a wheel turned to the left is held there to the left
-    rate     9 of 10 changes of T are more than 1.5 ticks apart        a slow torque repeated on quick rows
+    rate     9 of 10 changes of T are more than 1.5 ticks apart, half of them equally far: a slow torque repeated on quick rows
 
 The wheel's angle, or else the yaw rate or the lateral acceleration, the first that every drive has. A drive on which the torque
-hardly follows it (a straight motorway) is not asked for its sign.
+hardly follows it (a straight motorway) is not asked for its sign; and a sensor of coarse steps changes seldom, but not evenly.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ MOST_RMS = 30.0  # N m
 _APART = 20.0  # rms over rms
 _CLEAR = 0.4  # correlation
 _OFTEN = 1.5  # ticks between changes
+_EVEN = 0.2  # of the usual time between changes
 _LEAST = 50  # samples or changes, to say anything
 _ANSWERS = ("steering_wheel_angle", "yaw_rate", "lateral_acceleration")
 
@@ -87,10 +88,14 @@ def _rate(drives: Mapping[str, Log], target: str, tick: float) -> list[Finding]:
     found = []
     for name, log in drives.items():
         between = time_between_changes(log[target])
-        if between.size >= _LEAST and float(np.quantile(between, 0.1)) > _OFTEN * tick:
+        if between.size < _LEAST:
+            continue
+        usual = float(np.median(between))
+        evenly = float(np.mean(np.abs(between - usual) < _EVEN * usual)) > 0.5
+        if evenly and float(np.quantile(between, 0.1)) > _OFTEN * tick:
             found.append(
                 Finding(
-                    "bad", f"the torque of {name} changes every {np.median(between):.2g} s only and is repeated in between, "
+                    "bad", f"the torque of {name} changes every {usual:.2g} s only and is repeated in between, "
                     f"which is learnt as steadiness (features are {tick:g} s apart): log it as measured, or leave the drive out",
                 )
             )  # fmt: skip
