@@ -44,7 +44,7 @@ def test_one_of_three_drives_with_the_other_sign_is_named() -> None:
     (found,) = told(monday=driven(), tuesday=scaled(driven(seed=2), -1), wednesday=driven("carla", seed=3))
     assert found.severity == "bad"
     assert "torque of tuesday" in found.text
-    assert found.text.endswith("correct the sign in the names file of tuesday")
+    assert found.text.endswith("turn the sign in the recording, or leave it out")
 
 
 def test_of_two_drives_that_contradict_each_other_both_are_named() -> None:

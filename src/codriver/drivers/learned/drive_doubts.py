@@ -50,7 +50,10 @@ def _size(drives: Mapping[str, Log], target: str) -> list[Finding]:
     apart = [name for name, size in rms.items() if least > 0 and size > _APART * least and size <= MOST_RMS]
     smallest = min(rms, key=lambda name: rms[name] if rms[name] > 0 else np.inf)
     found += [
-        Finding("bad", f"the torque of {name} is {rms[name] / least:.0f} times that of {smallest} (rms): {_UNIT}")
+        Finding(
+            "bad",
+            f"the torque of {name} is {rms[name] / least:.0f} times that of {smallest} (rms), so units differ: {_ALIKE}",
+        )
         for name in apart
     ]
     return found
@@ -75,10 +78,12 @@ def _sign(drives: Mapping[str, Log], target: str) -> list[Finding]:
     told = ", ".join(f"{name} {follows[name]:+.2f}" for name in clear)
     if len(odd) == len(clear):
         return [
-            Finding("bad", f"the torque follows {answer} with opposite signs (correlation: {told}): {_WAY} of some")
+            Finding(
+                "bad", f"the torque follows {answer} with opposite signs (correlation: {told}): some are wrong; {_WAY}"
+            )
         ]
     return [
-        Finding("bad", f"the torque of {name} follows {answer} the other way than most (correlation: {told}): {_WAY} of {name}")
+        Finding("bad", f"the torque of {name} follows {answer} the other way than most (correlation: {told}); {_WAY}")
         for name in odd
     ]  # fmt: skip
 
@@ -129,4 +134,5 @@ def _rms(signal: Signal) -> float:
 
 
 _UNIT = "correct its unit (or scale) in the names file (N mm: scale = 0.001)"
-_WAY = "correct the sign in the names file"
+_ALIKE = "one names file counts for all drives, so convert the recording, or leave it out"
+_WAY = "one names file counts for all drives, so turn the sign in the recording, or leave it out"
