@@ -6,7 +6,8 @@ protocol, evaluate                                           what is held out; t
 calibration                                                  bands that hold what they promise
 learned_driver, driver_file                                  a driver as a value, and as a file
 horizon, rollout                                             error against horizon, direct or iterated through a vehicle
-recognise                                                    which of several drivers is this?
+drive_doubts, no_row                                         drives that should not be learnt from, and why
+recognise, fingerprint                                       which of several drivers is this? which drives has he seen?
 driver_observer                                              a driver as an Observer: batch, live, C
 """
 
