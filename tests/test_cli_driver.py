@@ -68,6 +68,17 @@ def test_from_drives_to_a_driver_to_torques_foretold(laps: Path, tmp_path: Path)
     assert 0.85 < told["inside95"] < 1
 
 
+def test_signals_of_ones_own_choice(laps: Path, tmp_path: Path) -> None:
+    driver = tmp_path / "anna.driver"
+    command = ("driver", "fit", laps / "anna.csv", *names(laps), "--model", "ridge", "-o", driver)
+    told = json.loads(ran(*command, "--signals", "steering_wheel_angle,road_curvature", "--json"))
+    assert told["signals"] == ["steering_wheel_angle", "road_curvature", "longitudinal_speed"]
+    assert told["left_out"] == []
+    done = CliRunner().invoke(app, [str(word) for word in (*command, "--signals", "steering_angel")])
+    assert isinstance(done.exception, CodriverError)
+    assert "standard names" in str(done.exception)
+
+
 def test_evaluate_holds_drives_out_and_says_who_wins(laps: Path, tmp_path: Path) -> None:
     report = tmp_path / "judged.html"
     command = ("driver", "evaluate", laps / "anna.csv", laps / "anna2.csv", *names(laps), "--model", "ridge", "--both")
@@ -100,6 +111,23 @@ def test_a_verdict_on_many_models_is_on_one_and_a_table() -> None:
     assert first.title == "Verdict on guarded"
     table = next(part for part in first.parts if isinstance(part, Table))
     assert [row[0] for row in table.rows] == [FULL[kind] for kind in judged.kinds]
+
+
+def test_error_against_horizon(laps: Path, tmp_path: Path) -> None:
+    report, vehicle = tmp_path / "horizon.html", laps / "anna" / "vehicle.toml"
+    command = ("driver", "horizon", laps / "anna.csv", laps / "anna2.csv", *names(laps), "--model", "ridge")
+    told = json.loads(ran(*command, "--horizons", "0.2,1", "--vehicle", vehicle, "--report", report, "--json"))
+    made = {(row["model"], row["form"]): row["rmse_Nm"] for row in told["models"]}
+    assert list(made) == [("pwc", "direct"), ("pwl", "direct"), ("ridge", "direct"), ("ridge", "iterated")]
+    assert made["ridge", "direct"][1] < 0.5 * made["pwc", "direct"][1]
+    assert told["held_out"] == ["anna", "anna2"]
+    assert "Forecasts, one a second" in report.read_text()
+    said = ran(*command, "--horizons", "0.5", "--vehicle", "okamoto2019-simulator")
+    assert "not iterated: " in said
+    assert "0.5 s" in said
+    done = CliRunner().invoke(app, ["driver", "horizon", str(laps / "anna.csv"), "--horizons", "0.2,later"])
+    assert isinstance(done.exception, CodriverError)
+    assert "positive numbers" in str(done.exception)
 
 
 def test_compare_names_the_driver(laps: Path, tmp_path: Path) -> None:

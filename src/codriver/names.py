@@ -61,14 +61,25 @@ _ENTRIES = (
     Quantity("vertical_acceleration", "m/s^2", "m/s^2", "az", "specific force along z, +9.81 at rest", -60, 60),
     Quantity("sideslip_angle", "rad", "deg", "beta", "atan(vy/vx)", -pi, pi),
     Quantity("yaw_rate", "rad/s", "deg/s", "r", "rotation about z, positive to the left", -7, 7),
+    Quantity(
+        "heading_rate",
+        "rad/s",
+        "deg/s",
+        "W",
+        "rotation about the road's normal, positive to the left; yaw_rate where nothing leans",
+        -7,
+        7,
+    ),
     Quantity("roll_rate", "rad/s", "deg/s", "p", "rotation about x, positive when the right side goes down", -7, 7),
     Quantity("pitch_rate", "rad/s", "deg/s", "q", "rotation about y, positive when the nose goes down", -7, 7),
     Quantity("roll_angle", "rad", "deg", "phi", "positive when leaning to the right", -pi / 2, pi / 2),
     Quantity("roll_acceleration", "rad/s^2", "rad/s^2", "p'", "time derivative of roll_rate"),
+    Quantity("pitch_angle", "rad", "deg", "theta", "positive when the nose is down", -pi / 2, pi / 2),
     Quantity("distance", "m", "m", "s", "distance travelled, the papers' curvilinear coordinate", -1e3, 1e7),
     Quantity("latitude", "deg", "deg", "lat", "north positive", -90, 90),
     Quantity("longitude", "deg", "deg", "lon", "east positive", -180, 180),
     Quantity("altitude", "m", "m", "h", "height above sea level", -500, 9000),
+    Quantity("pitching", "rad/s", "deg/s", "theta'", "pitch rate of a leaning machine beside that of its turn", -3, 3),
     # what the person does
     Quantity(
         "accelerator_pedal", "1", "%", "p_r", "accelerator pedal position, 0 released to 1 fully pressed", -0.02, 1.02
@@ -129,6 +140,15 @@ _ENTRIES = (
         2000,
     ),
     Quantity(
+        "rider_lean",
+        "rad",
+        "deg",
+        "lambda",
+        "of the rider's upper body beside the machine, positive to the right",
+        -pi / 2,
+        pi / 2,
+    ),
+    Quantity(
         "alignment_torque",
         "N*m",
         "N*m",
@@ -156,6 +176,7 @@ _ENTRIES = (
     Quantity("clutch", "1", "1", "clutch", "0 closed (torque passes) to 1 open (no torque passes)", 0, 1, inf),
     # the road
     Quantity("road_slope", "rad", "%", "alpha", "positive uphill", -0.6, 0.6),
+    Quantity("road_bank", "rad", "deg", "beta_r", "tilt across, positive when the right side is lower", -0.6, 0.6),
     Quantity("road_curvature", "1/m", "1/m", "rho", "positive to the left", -1, 1),
     Quantity("lateral_offset", "m", "m", "y", "of the centre of mass from the path, positive to the left", -20, 20),
     Quantity(

@@ -38,10 +38,11 @@ def estimate(
     report: Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)] = None,
     json: Json = False,
 ) -> None:
-    """Estimate what the driver intends, or does at the steering wheel, from a recorded drive.
+    """Estimate what the driver intends, or does at the steering wheel, or how a motorcycle leans, from a recorded drive.
 
     Examples: codriver estimate intent drive.blf --dbc car.dbc --names names.toml --vehicle bisoffi2017 -o drive.parquet;
-    codriver estimate driver-torque drive.csv --names names.toml --vehicle wheel.toml -o torque.parquet
+    codriver estimate driver-torque drive.csv --names names.toml --vehicle wheel.toml -o torque.parquet;
+    codriver estimate motorcycle ride.csv --names names.toml --vehicle sharp1971 -o lean.parquet
     """
     estimate_file(estimator, log, out, vehicle, dbc, names, ell, rate, preset, form, bus, report, json)
 

@@ -10,13 +10,14 @@ third order at SLOW Hz, which changes nothing in a linear model whose parameters
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from codriver.errors import LogError, MissingSignal
 from codriver.models.road_sight import PathAhead, path_errors
-from codriver.signals import Log
+from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
 
 NEEDED = ("steering_wheel_angle", "driver_torque", "longitudinal_speed", "road_curvature")
@@ -38,17 +39,21 @@ class DriverRecord:
 
     Attributes:
         near, far, angle: theta_near, theta_far, delta_s, rad.
+        offset, heading: of the car from the path, m, rad.
         torque: T_dr, N m; curvature: rho, 1/m.
         speed: mean, m/s.
         dt: s.
         first, last: rows that count.
         summed: offset and heading error are sums, and everything went through the high-pass.
         source: of the log.
+        points: near, m, and far, s, of the two directions; `path` and `place`, where the car was on it, m, give those of others.
     """
 
     near: Array = field(repr=False)
     far: Array = field(repr=False)
     angle: Array = field(repr=False)
+    offset: Array = field(repr=False)
+    heading: Array = field(repr=False)
     torque: Array = field(repr=False)
     curvature: Array = field(repr=False)
     speed: float
@@ -57,6 +62,19 @@ class DriverRecord:
     last: int
     summed: bool
     source: str
+    points: tuple[float, float]
+    path: PathAhead = field(repr=False)
+    place: Array = field(repr=False)
+
+    def seen(self, near: float, far: float) -> tuple[Array, Array]:
+        """Directions of two points, rad: m ahead, and s ahead."""
+        if (near, far) == self.points:
+            return self.near, self.far
+        return self._direction(near), self._direction(far * self.speed)
+
+    def _direction(self, ahead: float) -> Array:
+        bend = self.path.bend(self.place, ahead)
+        return np.asarray((_quick(bend, self.dt) if self.summed else bend) - self.offset / ahead - self.heading)
 
 
 def driver_record(log: Log, near: float, far: float) -> DriverRecord:
@@ -81,8 +99,9 @@ def driver_record(log: Log, near: float, far: float) -> DriverRecord:
             f"{', '.join(NEEDED)}, and {' and '.join(WHERE)} or {' and '.join(MOTION)}",
             "map them in a names file; estimate driver_torque and sideslip_angle where no sensor has them",
         )
-    time, dt = _ticks(log, used, name)
-    values = {n: np.interp(time, log[n].time, log[n].values) for n in used}
+    known = {n: _known(log[n], name) for n in used}
+    time, dt = _ticks({n: t for n, (t, _) in known.items()}, log["driver_torque"].rate, name)
+    values = {n: np.interp(time, *known[n]) for n in used}
     v = values["longitudinal_speed"]
     speed = float(v.mean())
     if v.min() < LEAST_SPEED or v.std() > MOST_SPREAD * speed:
@@ -99,35 +118,63 @@ def driver_record(log: Log, near: float, far: float) -> DriverRecord:
     else:
         y, psi = values["lateral_offset"], values["heading_error"]
     ahead = far * speed
-    seen = (
-        path.bend(place, near) - y / near - psi, path.bend(place, ahead) - y / ahead - psi,
-        values["steering_wheel_angle"], values["driver_torque"], rho,
+    near_angle, far_angle, angle, y, psi, torque, bent = (
+        _quick(x, dt) if summed else x
+        for x in (
+            path.bend(place, near) - y / near - psi, path.bend(place, ahead) - y / ahead - psi,
+            values["steering_wheel_angle"], y, psi, values["driver_torque"], rho,
+        )
     )  # fmt: skip
-    near_angle, far_angle, angle, torque, bent = seen
-    if summed:
-        from scipy.signal import butter, sosfilt
-
-        sections = butter(3, SLOW, "highpass", fs=1 / dt, output="sos")
-        near_angle, far_angle, angle, torque, bent = (np.asarray(sosfilt(sections, x), float) for x in seen)
     first = round((SETTLED + (0.5 / SLOW if summed else 0.0)) / dt)
     last = int(np.searchsorted(place, place[-1] - max(near, ahead, PREVIEW * speed)))
-    return DriverRecord(near_angle, far_angle, angle, torque, bent, speed, dt, first, last, summed, name)
+    return DriverRecord(
+        near_angle,
+        far_angle,
+        angle,
+        y,
+        psi,
+        torque,
+        bent,
+        speed,
+        dt,
+        first,
+        last,
+        summed,
+        name,
+        (near, far),
+        path,
+        place,
+    )
 
 
-def _ticks(log: Log, used: tuple[str, ...], name: str) -> tuple[Array, float]:
+def _quick(x: Array, dt: float) -> Array:
+    """What the high-pass leaves."""
+    from scipy.signal import butter, sosfilt
+
+    return np.asarray(sosfilt(butter(3, SLOW, "highpass", fs=1 / dt, output="sos"), x), float)
+
+
+def _known(signal: Signal, name: str) -> tuple[Array, Array]:
+    """Stamps and values of the samples that are numbers."""
+    there = np.isfinite(signal.values)
+    if np.count_nonzero(there) < 2:
+        raise LogError(f"{name}: {signal.name} has no values", "a signal with numbers", "check how it was recorded")
+    return signal.time[there], np.asarray(signal.values[there], float)
+
+
+def _ticks(stamps: Mapping[str, Array], rate: float, name: str) -> tuple[Array, float]:
     """Ticks of the torque's rate over the stretch that all signals cover."""
     from itertools import starmap
 
-    torque = log["driver_torque"]
-    rate = min(torque.rate, FASTEST_RATE)
-    start, end = max(log[n].time[0] for n in used), min(log[n].time[-1] for n in used)
+    rate = min(rate, FASTEST_RATE)
+    start, end = max(t[0] for t in stamps.values()), min(t[-1] for t in stamps.values())
     if end - start < LEAST_SECONDS or rate < SLOWEST_RATE:
         raise LogError(
             f"{name}: {max(end - start, 0):.0f} s of all signals, torque at {rate:.3g} Hz",
             f"at least {LEAST_SECONDS:g} s at {SLOWEST_RATE:g} Hz: a driver's delay is 0.1 s",
             "record a longer drive, and faster",
         )
-    holes = {n: float(np.diff(log[n].time).max()) for n in used}
+    holes = {n: float(np.diff(t[(t >= start) & (t <= end)]).max(initial=0.0)) for n, t in stamps.items()}
     if max(holes.values()) > LONGEST_HOLE:
         said = ", ".join(starmap("{} {:.1f} s".format, [h for h in holes.items() if h[1] > LONGEST_HOLE]))
         raise LogError(
