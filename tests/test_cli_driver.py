@@ -11,11 +11,17 @@ import pytest
 from typer.testing import CliRunner
 
 from codriver.cli.app import app
+from codriver.cli.driver_words import evaluation_told
+from codriver.drivers.learned.evaluate import evaluate as judge
+from codriver.drivers.learned.protocol import Protocol
 from codriver.errors import CodriverError
+from codriver.report.document import Table
+from codriver.report.drivers import FULL, evaluation_document
 from codriver.simulate.circuit import CircuitSetting
 from codriver.simulate.circuit_drivers import circuit_driver
 from codriver.simulate.circuit_files import write_circuit
 from codriver.simulate.variability import Variability
+from driven import driven
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +56,10 @@ def test_from_drives_to_a_driver_to_torques_foretold(laps: Path, tmp_path: Path)
     assert "How anna steers" in page
     assert "learnt from" in page
     out = tmp_path / "foretold.parquet"
+    own = json.loads(ran("driver", "predict", driver, laps / "anna.csv", *names(laps), "-o", out, "--json"))
+    assert ["one that anna learnt from" in found["text"] for found in own["findings"]] == [True]
     told = json.loads(ran("driver", "predict", driver, laps / "anna2.csv", *names(laps), "-o", out, "--json"))
+    assert told["findings"] == []
     table = pq.read_table(out)
     assert table.num_rows == told["rows"]
     mean, then = (table[name].to_numpy() for name in ("driver_torque_ahead", "driver_torque_then"))
@@ -82,9 +91,26 @@ def test_evaluate_holds_drives_out_and_says_who_wins(laps: Path, tmp_path: Path)
     page = report.read_text()
     assert "What the leak is worth" in page
     assert "inverse dynamics" in page
+    assert (told["lead"], told["protocols"]["honest"]["models"]["ridge"]["against"]["pwc"]) == ("ridge", "better")
+    assert {f["severity"] for f in told["findings"] if "leak" in f["text"]} == {"bad"}
     said = ran("driver", "evaluate", laps / "anna.csv", *names(laps), "--model", "ridge", "--folds", "2")
     assert "held out in turn: A, B" in said
     assert "verdict" in said
+
+
+def test_a_verdict_on_many_models_is_on_one_and_a_table() -> None:
+    options = {"boosting": {"trees": 5}, "guarded": {"trees": 5}}
+    protocol = Protocol(folds=2).with_features(dense=False)
+    judged = judge({"anna": driven()}, tuple(options), protocol=protocol, options=options, calibrate=False)
+    told = evaluation_told([judged], ["anna"], [], None)
+    assert told["lead"] == "guarded"
+    assert any("guarded beats pwc" in f["text"] for f in told["findings"])
+    assert not any("boosting" in f["text"] for f in told["findings"])
+    assert told["protocols"]["honest"]["models"]["boosting"]["against"]["pwc"] == "better"
+    first = evaluation_document([judged], ["anna"], []).sections[0]
+    assert first.title == "Verdict on guarded"
+    table = next(part for part in first.parts if isinstance(part, Table))
+    assert [row[0] for row in table.rows] == [FULL[kind] for kind in judged.kinds]
 
 
 def test_error_against_horizon(laps: Path, tmp_path: Path) -> None:
@@ -111,7 +137,11 @@ def test_compare_names_the_driver(laps: Path, tmp_path: Path) -> None:
     told = json.loads(ran("driver", "compare", laps / "anna2.csv", *stored, *names(laps), "--json"))
     assert [one["name"] for one in told["drivers"]] == ["anna", "carla"]
     assert sum(one["share"] for one in told["drivers"]) == pytest.approx(1)
+    assert told["findings"] == []
     assert "anna" in ran("driver", "compare", laps / "anna2.csv", *stored, *names(laps)).splitlines()[0]
+    assert "one that anna learnt from" in ran("driver", "compare", laps / "anna.csv", *stored, *names(laps)).replace(
+        "\n", " "
+    )
 
 
 def test_export_writes_c(laps: Path, tmp_path: Path) -> None:

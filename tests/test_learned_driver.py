@@ -13,14 +13,14 @@ from scipy.stats import norm, t
 from codriver.drivers.learned.calibration import Calibration
 from codriver.drivers.learned.driver_file import driver_text, load_driver, parse_driver, save_driver
 from codriver.drivers.learned.driver_observer import observer_of
-from codriver.drivers.learned.evaluate import block_means, evaluate
+from codriver.drivers.learned.evaluate import _error_of_root, block_means, evaluate
 from codriver.drivers.learned.features import features_of
 from codriver.drivers.learned.kinds import BASELINES, KINDS, class_of
 from codriver.drivers.learned.learned_driver import LearnedDriver, fit_driver, fit_table
 from codriver.drivers.learned.prepare import prepared
 from codriver.drivers.learned.protocol import PROTOCOLS, Protocol, time_blocks
 from codriver.drivers.learned.recognise import recognise
-from codriver.drivers.learned.road_ahead import curvature_ahead
+from codriver.drivers.learned.road_ahead import with_road_ahead
 from codriver.errors import DesignError, FormatError, LogError, MissingSignal, UsageError
 from codriver.export import export_c
 from codriver.program import compile as compile_observer
@@ -96,23 +96,36 @@ def test_an_edited_file_is_refused_and_not_foretold_with(place, value, said: str
         parse_driver(json.dumps(whole), "x.driver")
 
 
-def with_road_ahead(log: Log, driver: LearnedDriver) -> Log:
-    """The log with the road ahead as a map would give it, on the driver's tick."""
-    setting = driver.protocol.features
-    grid = log.sample(["road_curvature", "longitudinal_speed"], setting.tick)
-    ahead = curvature_ahead(
-        grid.values["road_curvature"], grid.values["longitudinal_speed"], setting.tick, setting.previews
-    )
-    signals = [
-        Signal(f"road_curvature_ahead_{k + 1}", grid.time, column, "1/m", "map") for k, column in enumerate(ahead.T)
-    ]
-    return log.with_signals(*signals)
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("protocol", "features", "horizon"), 0.4), (("name",), "ben"), (("calibration", "scale"), 0.5),
+        (("model", "state", "offset"), 0.25), (("checksum",), "0"), (("more",), 1),
+    ],
+)  # fmt: skip
+def test_what_only_a_checksum_can_tell_is_refused_too(place, value) -> None:
+    whole = json.loads(driver_text(small("ridge")))
+    inner = whole
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = value
+    with pytest.raises(FormatError, match="edited after it was learnt"):
+        parse_driver(json.dumps(whole), "x.driver")
+
+
+def test_a_file_without_a_checksum_or_written_in_another_order_is_read() -> None:
+    driver = small("ridge")
+    whole = json.loads(driver_text(driver))
+    reordered = json.dumps(dict(reversed(whole.items())), indent=4)
+    del whole["checksum"]
+    for text in (reordered, json.dumps(whole)):
+        assert parse_driver(text, "x.driver").features == driver.features
 
 
 @pytest.mark.parametrize("kind", STEPPING)
 def test_the_observer_says_what_the_model_says(kind: str) -> None:
     driver = small(kind, Protocol())
-    log = with_road_ahead(driven(seed=2).between(0.0, 60.0), driver)
+    log = with_road_ahead(driven(seed=2).between(0.0, 60.0), driver.protocol.features)
     made = driver.predict(log)
     estimate = compile_observer(observer_of(driver)).run(log, start=log.start)
     valid = estimate.columns["valid"] > 0.5
@@ -121,6 +134,15 @@ def test_the_observer_says_what_the_model_says(kind: str) -> None:
     assert there.mean() > 0.98
     assert np.allclose(estimate.columns["driver_torque_ahead"][rows][there], made.mean[there], rtol=1e-9, atol=1e-9)
     assert np.allclose(estimate.columns["driver_torque_ahead_sd"][rows][there], made.sd[there], rtol=1e-9, atol=1e-9)
+
+
+def test_the_road_ahead_needs_curvature_and_speed_and_is_not_known_beyond_the_end() -> None:
+    with pytest.raises(MissingSignal, match="road_curvature"):
+        with_road_ahead(driven().without("road_curvature"))
+    made = with_road_ahead(driven().between(0.0, 30.0))
+    last = [np.isfinite(made[f"road_curvature_ahead_{k}"].values).sum() for k in (1, 8)]
+    assert last[0] - last[1] == pytest.approx(14, abs=3)  # 1.4 s at ticks of 0.1 s, at a speed that hardly changes
+    assert "road_curvature_ahead_9" not in made
 
 
 def test_the_observer_keeps_the_house_rules() -> None:
@@ -181,6 +203,19 @@ def test_the_baselines_are_in_every_table_and_gains_are_of_blocks() -> None:
     assert mean > 2 * error > 0
     assert judged.gains["pwc", "ridge"] == pytest.approx((-mean, error))
     assert [f.severity for f in judged.verdict("ridge")][:1] == ["ok"]
+    assert (judged.against("ridge", "pwc"), judged.against("pwc", "ridge")) == ("better", "worse")
+    assert judged.lead == "ridge"
+    for score in judged.scores["ridge"]:
+        assert 0.02 < score.rmse_error / score.rmse < 0.5
+
+
+def test_the_standard_error_of_an_rmse_by_drawing() -> None:
+    rng = np.random.default_rng(6)
+    squared = rng.chisquare(20, (4000, 30)) / 20
+    roots = np.sqrt(squared.mean(axis=1))
+    told = [_error_of_root(float(root), row) for root, row in zip(roots, squared, strict=True)]
+    assert np.mean(told) == pytest.approx(roots.std(), rel=0.03)
+    assert np.isnan(_error_of_root(1.0, np.ones(1)))
 
 
 def test_a_leaking_protocol_is_said_in_the_verdict() -> None:
@@ -189,6 +224,19 @@ def test_a_leaking_protocol_is_said_in_the_verdict() -> None:
     assert any("inverse dynamics" in text for text in said)
     honest = evaluate({"a": driven()}, ["ridge"], protocol=SPARSE, calibrate=False)
     assert not any("leak" in f.text for f in honest.verdict("ridge"))
+
+
+def test_leaks_name_what_the_drives_hold_only() -> None:
+    log = driven().without("sideslip_angle", "yaw_rate")
+    protocol = PROTOCOLS["paper2019"]
+    judged = evaluate({"a": log}, ["pwc"], protocol=protocol, calibrate=False)
+    driver = fit_driver(log, "pwc", protocol=protocol)
+    for leaks in (judged.leaks, driver.leaks):
+        assert "the features hold steering_wheel_angle at the very moment" in leaks[0]
+        assert len(leaks) == len(protocol.leaks)
+    bare = protocol.leaks_without(("sideslip_angle", "yaw_rate", "steering_wheel_angle"))
+    assert not any("inverse dynamics" in leak for leak in bare)
+    assert len(bare) == len(protocol.leaks) - 1
 
 
 def test_a_torque_that_was_estimated_is_said_to_be_so() -> None:

@@ -16,6 +16,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 import codriver as cd
 from codriver.drivers.learned.blocks import block_folds
 from codriver.drivers.learned.boosting import BoostedRidge
+from codriver.drivers.learned.guarded import GuardedRegressor
 from codriver.drivers.learned.naive import PiecewiseConstant, PiecewiseLinear
 from codriver.drivers.learned.network import NetworkRegressor, output, output_and_jacobian
 from codriver.drivers.learned.process import GaussianProcessTorque
@@ -294,3 +295,20 @@ def test_pipeline_and_search():
     assert scores["test_score"].min() > 0.9
     search = GridSearchCV(NetworkRegressor(restarts=1), {"hidden": [1, 2]}, cv=folds).fit(X, y)
     assert search.best_score_ > 0.9
+
+
+def test_features_that_do_not_vary_have_no_weight_and_no_weight_is_dust() -> None:
+    rng = np.random.default_rng(4)
+    X = rng.standard_normal((400, 6))
+    X[:, 4] = 1e-13 * rng.standard_normal(400)
+    X[:, 5] = 0.0
+    y = X[:, 0] - 0.3 * X[:, 1] + 0.1 * rng.standard_normal(400)
+    ridge = RidgeRegressor(gap=0).fit(X, y)
+    assert ridge.coef_[4:].tolist() == [0.0, 0.0]
+    assert (ridge.coef_[:2] != 0).all()
+    fewer = RidgeRegressor(gap=0, alpha=ridge.alpha_).fit(X[:, :4], y)
+    assert np.allclose(ridge.predict(X), fewer.predict(X[:, :4]), rtol=0, atol=1e-12)
+    guarded = GuardedRegressor(trees=5, gap=0).fit(X, y)
+    for weights in (ridge.spread_, guarded.root_):
+        sizes = np.abs(weights[weights != 0])
+        assert sizes.min() > 1e-16 * sizes.max()

@@ -81,7 +81,7 @@ def fit(
     with working(not json, len(drives) + 2) as stage:
         logs, notes = read_drives(drives, dbc, names, bus, vehicle, stage)
         stage(f"learning {model}")
-        driver = fit_driver(list(logs.values()), model, name=name or out.stem, protocol=chosen, options=parameters)
+        driver = fit_driver(logs, model, name=name or out.stem, protocol=chosen, options=parameters)
         stage("writing")
         _write(driver, logs, out, report, command_line(), save_driver)
     told = driver_told(driver, list(logs), notes, out, report)

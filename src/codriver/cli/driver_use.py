@@ -34,7 +34,10 @@ def compare(
         logs, notes = read_drives([drive], dbc, names, bus, vehicle, stage)
         stage("comparing")
         found = recognise(next(iter(logs.values())), known)
-    told: dict[str, Any] = {"drive": str(drive), "notes": notes, "drivers": [dict(vars(one)) for one in found]}
+    told: dict[str, Any] = {"drive": str(drive), "notes": notes, "drivers": [], "findings": []}
+    for one in found:
+        told["drivers"].append({name: value for name, value in vars(one).items() if name != "unfair"})
+        told["findings"] += [{"severity": f.severity, "text": f.text} for f in one.unfair]
     if json:
         typer.echo(json_module.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
     else:
@@ -58,7 +61,7 @@ def predict(
     from codriver.cli.estimate import refuse_recording
     from codriver.cli.terminal import console, say_findings, working
     from codriver.drivers.learned.driver_file import load_driver
-    from codriver.drivers.learned.likeness import doubts_of
+    from codriver.drivers.learned.likeness import doubts_of, unfair
     from codriver.logs.write import Column, check_output, write_table
 
     check_output(out)
@@ -67,7 +70,8 @@ def predict(
     with working(not json, 2) as stage:
         logs, notes = read_drives([drive], dbc, names, bus, vehicle, stage)
         stage("foretelling")
-        made = known.predict(next(iter(logs.values())), with_target=False)
+        log = next(iter(logs.values()))
+        made = known.predict(log, with_target=False)
     columns = [
         Column("driver_torque_ahead", made.mean, "N*m"), Column("driver_torque_ahead_sd", made.sd, "N*m"),
         Column("driver_torque_ahead_low", made.low, "N*m"), Column("driver_torque_ahead_high", made.high, "N*m"),
@@ -82,8 +86,8 @@ def predict(
         "stays_rmse_Nm": float(np.sqrt(np.mean((made.measured - made.last)[there] ** 2))) if error.size else None,
         "inside95": float(np.mean(((made.measured >= made.low) & (made.measured <= made.high))[there])) if error.size else None,
         "findings": [
-            *({"severity": "bad", "text": f"leak: {leak}"} for leak in known.protocol.leaks),
-            *({"severity": f.severity, "text": f.text} for f in doubts_of(known, made)),
+            *({"severity": "bad", "text": f"leak: {leak}"} for leak in known.leaks),
+            *({"severity": f.severity, "text": f.text} for f in (*unfair(known, log), *doubts_of(known, made))),
         ],
         "notes": notes, "result": str(out),
     }  # fmt: skip

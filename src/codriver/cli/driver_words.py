@@ -20,16 +20,19 @@ def driver_told(
     return {
         "name": driver.name, "model": driver.kind, "logs": list(drives), "protocol": driver.protocol.name,
         "target": driver.target, "signals": list(driver.signals), "left_out": list(driver.left_out),
-        "features": len(driver.features), "horizon_s": setting.horizon, **driver.training,
+        "features": len(driver.features), "horizon_s": setting.horizon,
+        **{name: value for name, value in driver.training.items() if name != "prints"},
         "parameters": {k: v for k, v in driver.regressor.get_params(deep=False).items() if isinstance(v, int | float | str)},
-        "leaks": list(driver.protocol.leaks), "notes": list(notes), "band_scale": driver.calibration.scale,
+        "leaks": list(driver.leaks),
+        "findings": [{"severity": f.severity, "text": f.text} for f in driver.doubts],
+        "notes": list(notes), "band_scale": driver.calibration.scale,
         "band_nu": driver.calibration.nu, "result": str(out), "report": str(report) if report is not None else None,
     }  # fmt: skip
 
 
 def say_driver(told: dict[str, Any]) -> None:
     """Show it."""
-    from codriver.cli.terminal import console
+    from codriver.cli.terminal import console, say_findings
 
     out = console()
     out.print(
@@ -45,6 +48,7 @@ def say_driver(told: dict[str, Any]) -> None:
             f"{told['held_out_stays_rmse']:.3f}), {told['held_out_inside95']:.0%} in the 95 % band",
             markup=False,
         )
+    say_findings(out, told["findings"])
     for note in told["notes"]:
         out.print(f"  note {note}", markup=False)
     for leak in told["leaks"]:
@@ -57,32 +61,35 @@ def evaluation_told(
 ) -> dict[str, Any]:
     """What `driver evaluate` tells."""
     first = found[0]
-    judged = [k for k in first.kinds if k not in ("pwc", "pwl", "ridge")]
     return {
         "drives": list(drives), "target": first.target, "horizon_s": first.protocol.features.horizon,
-        "left_out": list(first.left_out), "notes": list(notes),
+        "left_out": list(first.left_out), "notes": list(notes), "lead": first.lead,
         "protocols": {e.protocol.name: {"folds": [s.fold for s in e.scores["pwc"]], "models": _models(e)} for e in found},
         "findings": [
             {"severity": f.severity, "text": f.text}
-            for f in dict.fromkeys(f for kind in judged or ["ridge"] for f in first.verdict(kind))
+            for f in first.verdict(first.lead)
         ]
         + [
-            {"severity": "warn", "text": f"protocol {e.protocol.name} leaks: {leak}"}
+            {"severity": "bad", "text": f"protocol {e.protocol.name} leaks: {leak}"}
             for e in found[1:]
-            for leak in e.protocol.leaks
+            for leak in e.leaks
         ],
         "report": str(report) if report is not None else None,
     }  # fmt: skip
 
 
 def _models(e: Evaluation) -> dict[str, Any]:
+    from codriver.drivers.learned.kinds import BASELINES
+
     made = {}
     for kind in e.kinds:
         spread = e.spread(kind)
         made[kind] = {
             "rmse_Nm": e.mean(kind), "rmse_se_Nm": _finite(spread), "ratio_to_pwc": e.mean(kind, "ratio"),
             "nrmse": _finite(e.mean(kind, "nrmse")), "inside68": e.mean(kind, "inside68"), "inside95": e.mean(kind, "inside95"),
-            "log_density": e.mean(kind, "log_density"), "fit_s": max(s.seconds for s in e.scores[kind]),
+            "log_density": e.mean(kind, "log_density"),
+            "against": {other: e.against(kind, other) for other in BASELINES if other != kind},
+            "fit_s": max(s.seconds for s in e.scores[kind]),
             "folds": [s.rmse for s in e.scores[kind]],
         }  # fmt: skip
     return made
@@ -108,16 +115,30 @@ def say_evaluation(told: dict[str, Any]) -> None:
     for name, one in told["protocols"].items():
         out.print(f"\nprotocol {name}; held out in turn: {', '.join(one['folds'])}\n", markup=False)
         table = Table(box=None, pad_edge=False)
-        for column in ("model", "RMSE, N m", "+-", "of pwc", "in 68 %", "in 95 %", "log density", "fit, s"):
-            table.add_column(column, justify="left" if column == "model" else "right")
+        for column in (
+            "model",
+            "RMSE, N m",
+            "+-",
+            "of pwc",
+            "in 68 %",
+            "in 95 %",
+            "log density",
+            "fit, s",
+            "vs pwc",
+            "vs ridge",
+        ):
+            left = column in ("model", "vs pwc", "vs ridge")
+            table.add_column(column, justify="left" if left else "right", no_wrap=True)
         for kind, row in one["models"].items():
             spread = f"{row['rmse_se_Nm']:.3f}" if row["rmse_se_Nm"] is not None else "-"
             table.add_row(
                 kind, f"{row['rmse_Nm']:.4f}", spread, f"{row['ratio_to_pwc']:.3f}", f"{row['inside68']:.0%}",
                 f"{row['inside95']:.0%}", f"{row['log_density']:.3f}", f"{row['fit_s']:.1f}",
+                *(row["against"].get(other, "-").replace("not told apart", "~") for other in ("pwc", "ridge")),
             )  # fmt: skip
         out.print(table)
-    out.print("\n[bold]verdict[/]:")
+    out.print("vs: whether the gain is beyond two standard errors over blocks of 10 s; ~ cannot be told", markup=False)
+    out.print(f"\n[bold]verdict on {told['lead']}[/]:")
     say_findings(out, told["findings"])
     if told["report"]:
         out.print(f"\nwrote {told['report']}", markup=False)
@@ -127,7 +148,7 @@ def say_likeness(told: dict[str, Any]) -> None:
     """Show which driver a drive is."""
     from rich.table import Table
 
-    from codriver.cli.terminal import console
+    from codriver.cli.terminal import console, say_findings
 
     out = console()
     best = told["drivers"][0]
@@ -144,5 +165,6 @@ def say_likeness(told: dict[str, Any]) -> None:
             f"{one['rmse']:.3f}", f"{one['inside95']:.0%}",
         )  # fmt: skip
     out.print(table)
+    say_findings(out, told["findings"])
     for note in told["notes"]:
         out.print(f"note {note}", markup=False)

@@ -38,12 +38,14 @@ def evaluation_document(
         command: that made it.
     """
     first = found[0]
-    judged = [k for k in first.kinds if k not in BASELINES] or ["ridge"]
-    items = dict.fromkeys((f.severity, f.text) for kind in judged for f in first.verdict(kind))
-    items |= dict.fromkeys(
-        ("warn", f"protocol {e.protocol.name} leaks: {t}") for e in found[1:] for t in e.protocol.leaks
-    )
-    sections = [Section("Verdict", (Findings(tuple(items)), *([" ".join(f"{n}." for n in notes)] if notes else [])))]
+    items = dict.fromkeys((f.severity, f.text) for f in first.verdict(first.lead))
+    items |= dict.fromkeys(("bad", f"protocol {e.protocol.name} leaks: {t}") for e in found[1:] for t in e.leaks)
+    verdict: list[Part] = [Findings(tuple(items))]
+    if len([kind for kind in first.kinds if kind not in BASELINES]) > 1:
+        verdict.append(_verdicts(first))
+    if notes:
+        verdict.append(" ".join(f"{n}." for n in notes))
+    sections = [Section(f"Verdict on {FULL[first.lead].removesuffix(' (default)')}", tuple(verdict))]
     sections += [Section(f"Protocol {e.protocol.name}", protocol_parts(e)) for e in found]
     if len(found) > 1:
         sections.append(Section("What the leak is worth", (leak_table(found),)))
@@ -74,7 +76,7 @@ def leak_table(found: Sequence[Evaluation]) -> Table:
     return Table(
         ("model", *(e.protocol.name for e in found)), tuple(rows),
         "RMSE over that of 'the torque stays', under each protocol. Where a protocol leaks, its column is a figure of the protocol "
-        "and not of the model. " + " ".join(f"{e.protocol.name}: {leak}." for e in found for leak in e.protocol.leaks),
+        "and not of the model. " + " ".join(f"{e.protocol.name}: {leak}." for e in found for leak in e.leaks),
     )  # fmt: skip
 
 
@@ -85,10 +87,9 @@ def driver_document(driver: LearnedDriver, drives: Mapping[str, Log], command: s
         parts += [_foretold(driver.held), _errors(driver)]
     training, setting = driver.training, driver.protocol.features
     sections = [Section("Foretold on blocks held out in turn", tuple(parts))] if parts else []
-    if driver.protocol.leaks:
-        sections.insert(
-            0, Section("Warnings", (Findings(tuple(("bad", f"leak: {t}") for t in driver.protocol.leaks)),))
-        )
+    warned = [(f.severity, f.text) for f in driver.doubts] + [("bad", f"leak: {t}") for t in driver.leaks]
+    if warned:
+        sections.insert(0, Section("Warnings", (Findings(tuple(warned)),)))
     sections.append(Section("Features", (_features(driver),)))
     rmse = training.get("held_out_rmse", float("nan"))
     return Document(
@@ -108,10 +109,15 @@ def driver_document(driver: LearnedDriver, drives: Mapping[str, Log], command: s
 def _bars(e: Evaluation) -> Chart:
     """RMSE by fold and model, as in figures 12, 14 and 16."""
     folds = [s.fold for s in e.scores["pwc"]]
-    curves = tuple(Curve(FULL[k], folds, np.array([s.rmse for s in e.scores[k]]), OF_KIND[k], "bars") for k in e.kinds)
+    curves = []
+    for k in e.kinds:
+        rmse = np.array([s.rmse for s in e.scores[k]])
+        error = np.nan_to_num(np.array([s.rmse_error for s in e.scores[k]]))
+        curves.append(Curve(FULL[k], folds, rmse, OF_KIND[k], "bars", low=rmse - error, high=rmse + error))
     return Chart(
-        "Error on each part held out", "part held out", (Plot("RMSE (N m)", curves, 300),),
-        "Lower is better. A part is foretold by models that learnt from all others.",
+        "Error on each part held out", "part held out", (Plot("RMSE (N m)", tuple(curves), 300),),
+        "Lower is better. A part is foretold by models that learnt from all others. Whiskers: standard error from the scatter over "
+        "blocks of 10 s within the part; models share the part, so they differ by less than whiskers suggest.",
     )  # fmt: skip
 
 
@@ -127,19 +133,38 @@ def _means(e: Evaluation) -> Chart:
     )  # fmt: skip
 
 
+def _verdicts(e: Evaluation) -> Table:
+    """Every model against the baselines."""
+    rows = []
+    for kind in e.kinds:
+        words = (_mark(e.against(kind, other)) if other != kind else "-" for other in BASELINES)
+        rows.append((FULL[kind], *words, 100 * e.mean(kind, "inside95")))
+    return Table(
+        ("model", *(f"against {FULL[other]}" for other in BASELINES), "% in 95 % band"), tuple(rows),
+        "All models: by the gain in squared error over blocks of 10 s, two standard errors.",
+    )  # fmt: skip
+
+
+def _mark(against: str) -> Mark | str:
+    """A word on a comparison, coloured."""
+    if against == "better":
+        return Mark("good", against)
+    if against == "worse":
+        return Mark("bad", against)
+    return Mark("open", against) if against != "-" else "-"
+
+
 def _table(e: Evaluation) -> Table:
     rows = []
     for kind in e.kinds:
         ratio = e.mean(kind, "ratio")
         against = "-"
         if kind != "ridge":
-            mean, error = e.gains[kind, "ridge"]
-            against = "better" if mean > 2 * error else "worse" if mean < -2 * error else "not told apart"
-        mark = {"better": "good", "worse": "bad"}.get(against, "open")
+            against = e.against(kind, "ridge")
         rows.append((
             FULL[kind], e.mean(kind), e.spread(kind) if len(e.scores[kind]) > 1 else None, ratio, e.mean(kind, "nrmse"),
             100 * e.mean(kind, "inside68"), 100 * e.mean(kind, "inside95"), e.mean(kind, "log_density"),
-            Mark(mark, against) if against != "-" else "-",  # type: ignore[arg-type]
+            _mark(against),
             max(s.seconds for s in e.scores[kind]),
         ))  # fmt: skip
     return Table(

@@ -6,7 +6,8 @@ protocol, evaluate                                           what is held out; t
 calibration                                                  bands that hold what they promise
 learned_driver, driver_file                                  a driver as a value, and as a file
 horizon, rollout                                             error against horizon, direct or iterated through a vehicle
-recognise                                                    which of several drivers is this?
+drive_doubts, no_row                                         drives that should not be learnt from, and why
+recognise, fingerprint                                       which of several drivers is this? which drives has he seen?
 driver_observer                                              a driver as an Observer: batch, live, C
 """
 
@@ -23,6 +24,7 @@ from codriver.drivers.learned.prepare import prepared
 from codriver.drivers.learned.protocol import PROTOCOLS, Protocol, folds_of
 from codriver.drivers.learned.recognise import Likeness, recognise
 from codriver.drivers.learned.regressor import TorqueRegressor
+from codriver.drivers.learned.road_ahead import with_road_ahead
 
 __all__ = [
     "BASELINES",
@@ -53,4 +55,5 @@ __all__ = [
     "recognise",
     "regressor_of",
     "save_driver",
+    "with_road_ahead",
 ]

@@ -1,14 +1,17 @@
 """Driver files: a learned driver as JSON, numbers only.
 
     {"format": "codriver driver", "version": 1, "name": ..., "kind": "ann", "protocol": {...}, "features": [...],
-     "scaling": {...}, "model": {"parameters": {...}, "state": {...}}, "calibration": {...}, "training": {...}}
+     "scaling": {...}, "model": {"parameters": {...}, "state": {...}}, "calibration": {...}, "training": {...},
+     "checksum": SHA-256 of the rest as JSON without spaces, names in order}
 
-No code is in such a file, so reading one cannot run anything. Floats are written so that they come back with the same bits. A later
+No code is in such a file, so reading one cannot run anything. Floats are written so that they come back with the same bits. A
+file whose checksum is not that of its content was edited, and is refused; one without a checksum is of an earlier codriver. A later
 version reads the files of an earlier one; of a later one's it says so.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -87,7 +90,13 @@ def driver_text(driver: LearnedDriver) -> str:
         "model": {"parameters": _plain(driver.regressor.get_params(deep=False)), "state": _plain(driver.regressor.state())},
         "calibration": driver.calibration.as_plain(), "training": _plain(dict(driver.training)),
     }  # fmt: skip
-    return json.dumps(whole, allow_nan=False, indent=1) + "\n"
+    return json.dumps({**whole, "checksum": checksum_of(whole)}, allow_nan=False, indent=1) + "\n"
+
+
+def checksum_of(whole: Mapping[str, Any]) -> str:
+    """SHA-256 of a driver file's content, its checksum left out."""
+    rest = {name: value for name, value in whole.items() if name != "checksum"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 def parse_driver(text: str, where: str) -> LearnedDriver:
@@ -111,12 +120,18 @@ def parse_driver(text: str, where: str) -> LearnedDriver:
             f"{where} is of version {whole.get('version')}", f"version 1 to {VERSION}", "use a newer codriver"
         )
     try:
-        return _driver(whole)
+        driver = _driver(whole)
     except (KeyError, TypeError, ValueError, UsageError) as error:
         raise FormatError(
             f"{where} is damaged: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else error!r}",
             _EXPECTED, "fit the driver again",
         ) from error  # fmt: skip
+    if "checksum" in whole and whole["checksum"] != checksum_of(whole):
+        raise FormatError(
+            f"{where} was edited after it was learnt: its checksum is not that of its content", _EXPECTED,
+            "fit the driver again; --name and --horizon change what they say",
+        )  # fmt: skip
+    return driver
 
 
 def _driver(whole: Mapping[str, Any]) -> LearnedDriver:

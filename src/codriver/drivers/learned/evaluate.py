@@ -10,18 +10,21 @@ over its standard error.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from codriver.drivers.learned.drive_doubts import doubts_about
 from codriver.drivers.learned.features import FeatureTable, Index, features_of
 from codriver.drivers.learned.kinds import BASELINES, DEFAULT
-from codriver.drivers.learned.learned_driver import fit_table
+from codriver.drivers.learned.learned_driver import LEAST_ROWS, fit_table
+from codriver.drivers.learned.no_row import rowless
 from codriver.drivers.learned.protocol import Fold, Protocol, folds_of
 from codriver.drivers.learned.scaling import Scaling
 from codriver.drivers.learned.twice import refuse_twice
+from codriver.errors import LogError
 from codriver.finding import Finding
 from codriver.signals import Log
 from codriver.signals.signal import Array
@@ -41,6 +44,7 @@ class Score:
         log_density: mean.
         rows: judged.
         seconds: that fitting took, calibration included.
+        rmse_error: standard error of rmse, N m, from the scatter over blocks of 10 s; NaN with one block.
     """
 
     kind: str
@@ -53,6 +57,7 @@ class Score:
     log_density: float
     rows: int
     seconds: float
+    rmse_error: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +72,7 @@ class Evaluation:
         left_out: signals that the drives lack.
         target: the torque's name.
         estimated: whether that is an estimate from the wheel's angle.
+        doubts: whether the drives can be judged together.
     """
 
     protocol: Protocol
@@ -76,11 +82,17 @@ class Evaluation:
     left_out: tuple[str, ...]
     target: str
     estimated: bool = False
+    doubts: tuple[Finding, ...] = ()
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """Judged, in order."""
         return tuple(self.scores)
+
+    @property
+    def leaks(self) -> tuple[str, ...]:
+        """Why figures under this protocol flatter on these drives."""
+        return self.protocol.leaks_without(self.left_out)
 
     def mean(self, kind: str, figure: str = "rmse") -> float:
         """A figure's mean over the folds; of squared figures the root of the mean square, over rows."""
@@ -98,9 +110,20 @@ class Evaluation:
         values = np.array([getattr(s, figure) for s in self.scores[kind]])
         return float(values.std(ddof=1) / np.sqrt(values.size)) if values.size > 1 else float("nan")
 
+    @property
+    def lead(self) -> str:
+        """The kind that the verdict is on: the default, or the first beside the baselines, or ridge."""
+        judged = [kind for kind in self.kinds if kind not in BASELINES]
+        return DEFAULT if DEFAULT in judged else judged[0] if judged else "ridge"
+
+    def against(self, kind: str, other: str) -> str:
+        """Whether the gain over another is beyond two standard errors: "better", "worse" or "not told apart"."""
+        mean, error = self.gains[kind, other]
+        return "better" if mean > 2 * error else "worse" if mean < -2 * error else "not told apart"
+
     def verdict(self, kind: str = DEFAULT) -> list[Finding]:
         """What can be said of a kind against the baselines, and of the protocol."""
-        found = [Finding("bad", f"leak: {text}") for text in self.protocol.leaks]
+        found = [*self.doubts, *(Finding("bad", f"leak: {text}") for text in self.leaks)]
         if self.estimated:
             worse = self.protocol.features.current != ()
             said = "the torque is itself an estimate from the wheel's angle" + (
@@ -120,12 +143,12 @@ class Evaluation:
         return found
 
     def _against(self, kind: str, other: str) -> Finding:
-        mean, error = self.gains[kind, other]
         ratio = self.mean(kind) / self.mean(other)
         said = f"RMSE {ratio:.3f} times that of {other}"
-        if mean > 2 * error:
+        found = self.against(kind, other)
+        if found == "better":
             return Finding("ok", f"{kind} beats {other}: {said}")
-        if mean < -2 * error:
+        if found == "worse":
             return Finding("bad", f"{kind} is worse than {other}: {said}; take {other} here")
         return Finding("warn", f"{kind} against {other}: {said}, which these drives cannot tell from 1")
 
@@ -153,10 +176,13 @@ def evaluate(
     protocol = protocol or Protocol()
     refuse_twice(drives)
     table = features_of(list(drives.values()), protocol.features)
-    return evaluate_table(
+    judged = evaluate_table(
         table, folds_of(table, protocol, tuple(drives)), kinds, protocol=protocol, options=options, calibrate=calibrate,
         progress=progress,
     )  # fmt: skip
+    setting = protocol.features
+    doubts = (*doubts_about(drives, table.target, setting.tick), *rowless(drives, table, setting))
+    return replace(judged, doubts=doubts)
 
 
 def evaluate_table(
@@ -168,6 +194,7 @@ def evaluate_table(
     every = tuple(dict.fromkeys((*BASELINES, *kinds)))
     scores: dict[str, list[Score]] = {kind: [] for kind in every}
     blocks: dict[str, list[Array]] = {kind: [] for kind in every}
+    _refuse_short(table, folds, protocol)
     for fold in folds:
         train, test = table.take(fold.train), table.take(fold.test)
         spread, stays = float(test.y.std()), float(np.sqrt(np.mean((test.y - test.X[:, test.torque_columns[0]]) ** 2)))
@@ -183,15 +210,15 @@ def evaluate_table(
             made = driver.predict_table(test)
             error, own = made.error, made.sd
             half = {p: (made.high - made.mean) * _over(driver.calibration, p) for p in (0.68, 0.95)}
-            rmse = float(np.sqrt(np.mean(error**2)))
+            rmse, squared = float(np.sqrt(np.mean(error**2))), block_means(error**2, made.time, test.drive)
             scores[kind].append(
                 Score(
                     kind, fold.name, rmse, _over_size(rmse, spread), _over_size(rmse, stays),
                     float(np.mean(np.abs(error) <= half[0.68])), float(np.mean(np.abs(error) <= half[0.95])),
-                    float(np.mean(made.log_density)), own.size, seconds,
+                    float(np.mean(made.log_density)), own.size, seconds, _error_of_root(rmse, squared),
                 )
             )  # fmt: skip
-            blocks[kind].append(block_means(error**2, made.time, test.drive))
+            blocks[kind].append(squared)
     gains = {}
     for kind in every:
         for other in every:
@@ -209,6 +236,24 @@ def evaluate_table(
     )
 
 
+def _refuse_short(table: FeatureTable, folds: Sequence[Fold], protocol: Protocol) -> None:
+    """Raise unless every fold leaves enough to learn from.
+
+    Raises:
+        LogError: the parts held out, and the gaps beside them, leave too little.
+    """
+    fold = min(folds, key=lambda f: f.train.size, default=None)
+    if fold is None or fold.train.size >= LEAST_ROWS:
+        return
+    gaps = len(table) - fold.train.size - fold.test.size
+    taken = f"; the part itself takes {fold.test.size}" + (f", the gaps beside it {gaps}" if gaps else "")
+    raise LogError(
+        f"{fold.train.size} of {len(table)} usable rows to learn from when {fold.name} is held out{taken}",
+        f"{LEAST_ROWS} rows or more",
+        f"give longer drives, or more of them (gaps of {protocol.gap:g} s keep neighbours apart)",
+    )
+
+
 def block_means(values: Array, time: Array, drive: Index, length: float = BLOCK) -> Array:
     """Means over blocks of `length` s of each drive; short ends that are less than half a block are left out."""
     found = []
@@ -220,6 +265,13 @@ def block_means(values: Array, time: Array, drive: Index, length: float = BLOCK)
         full = count >= 0.5 * np.median(count[count > 0])
         found.append(sums[full] / count[full])
     return np.concatenate(found)
+
+
+def _error_of_root(rmse: float, squared: Array) -> float:
+    """Standard error of an RMSE from mean squares over blocks: that of the mean square, over 2 RMSE."""
+    if squared.size < 2 or not rmse > 0:
+        return float("nan")
+    return float(squared.std(ddof=1) / np.sqrt(squared.size) / (2 * rmse))
 
 
 def _over_size(error: float, size: float) -> float:

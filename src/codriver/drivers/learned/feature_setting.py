@@ -106,10 +106,11 @@ class FeatureSetting:
     def leaks(self) -> tuple[str, ...]:
         """Why figures got with these features would flatter, one sentence each; empty when they would not."""
         found = []
-        if self.current:
+        effects = [name for name in self.current if name != "road_curvature"]
+        if effects:
             found.append(
-                f"the features hold {', '.join(n for n in self.current if n != 'road_curvature') or 'signals'} at the very moment "
-                "of the torque asked for: effects of it, so the task is mostly inverse dynamics"
+                f"the features hold {', '.join(effects)} at the very moment of the torque asked for: effects of it, so the task is "
+                "mostly inverse dynamics"
             )
         if self.smoothing == "paper2019":
             found.append("the local quadratic that smooths the signals sees the future of each moment")

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from codriver.drivers.learned.feature_setting import TARGETS, FeatureSetting
+from codriver.drivers.learned.no_row import needed, why_no_row
 from codriver.drivers.learned.road_ahead import curvature_ahead
 from codriver.drivers.learned.smoothing import local_quadratic, low_pass
 from codriver.errors import LogError, MissingSignal
@@ -167,11 +168,13 @@ def features_of(
     parts = [_rows(log, setting, columns, used, target, with_target) for log in drives]
     X = np.vstack([p[0] for p in parts])
     if not X.size:
+        names = tuple(dict.fromkeys((target, *used)))
+        why = "; ".join(f"{log.source or 'a drive'}: {why_no_row(log, setting, names)}" for log in drives)
         raise LogError(
-            f"no usable row of features in {', '.join(log.source or 'a drive' for log in drives)}",
-            f"at least {setting.history * setting.dt + setting.horizon:g} s in which {', '.join((target, *used))} are there and "
-            f"the vehicle goes faster than {setting.slowest:g} m/s",
-            "see with `codriver info` what the log holds; leave out signals that stop",
+            f"no usable row of features in {why}",
+            f"at least {needed(setting):g} s in which {', '.join(names)} are there and the vehicle goes faster than "
+            f"{setting.slowest:g} m/s",
+            "see with `codriver info` what the log holds; correct units in the names file; leave out signals that are slow or stop",
         )  # fmt: skip
     number = np.concatenate([np.full(p[1].size, k) for k, p in enumerate(parts)])
     lengths = tuple(length for p in parts for length in p[3])

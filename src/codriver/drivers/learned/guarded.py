@@ -26,7 +26,7 @@ import numpy as np
 
 from codriver.drivers.learned.blocks import block_folds, gap_that_fits
 from codriver.drivers.learned.regressor import State, TorqueRegressor
-from codriver.drivers.learned.ridge import RidgeRegressor, dot
+from codriver.drivers.learned.ridge import RidgeRegressor, dot, without_dust
 from codriver.drivers.learned.rows import array, rows, training_rows
 from codriver.drivers.learned.trees import Trees
 from codriver.kernel import Scalar, select
@@ -92,7 +92,7 @@ class GuardedRegressor(TorqueRegressor):
         x = (D - self.centre_) / self.size_
         # h = |R x|^2.
         covariance = x.T @ x / len(x) + SOFT * np.eye(x.shape[1])
-        self.root_ = np.linalg.inv(np.linalg.cholesky(covariance))
+        self.root_ = without_dust(np.linalg.inv(np.linalg.cholesky(covariance)))
         self.far_ = max(float(np.quantile(np.sum((x @ self.root_.T) ** 2, axis=1), FAR)), _LEAST)
         change = y - X[:, self.last]
         self.least_, self.most_ = float(change.min()), float(change.max())

@@ -15,13 +15,17 @@ from typing import Any
 import numpy as np
 
 from codriver.drivers.learned.calibration import Calibration
+from codriver.drivers.learned.drive_doubts import doubts_about
 from codriver.drivers.learned.features import Feature, FeatureTable, Index, features_of
+from codriver.drivers.learned.fingerprint import fingerprint
 from codriver.drivers.learned.kinds import DEFAULT, regressor_of
+from codriver.drivers.learned.no_row import rowless
 from codriver.drivers.learned.protocol import Fold, Protocol, time_blocks
 from codriver.drivers.learned.regressor import TorqueRegressor
 from codriver.drivers.learned.scaling import Scaling
 from codriver.drivers.learned.twice import refuse_twice
 from codriver.errors import LogError, UsageError
+from codriver.finding import Finding
 from codriver.signals import Log
 from codriver.signals.signal import Array
 
@@ -75,9 +79,11 @@ class LearnedDriver:
         scaling: of features and torque.
         regressor: what was learnt.
         calibration: of its bands.
-        training: what it was learnt from: drives, rows, seconds, spread of the torque; RMSE and coverage on held-out blocks.
+        training: what it was learnt from: drives and their prints, rows, minutes, size of the torque and whether that was
+            estimated; RMSE and coverage on held-out blocks.
         left_out: signals that the drives lack.
         held: what was foretold on blocks held out in turn, each by a model that had not seen it; not kept in a file.
+        doubts: whether the drives can be learnt from; not kept in a file.
     """
 
     name: str
@@ -92,6 +98,12 @@ class LearnedDriver:
     training: Mapping[str, Any] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
     held: TorquePrediction | None = field(default=None, repr=False)
+    doubts: tuple[Finding, ...] = ()
+
+    @property
+    def leaks(self) -> tuple[str, ...]:
+        """Why figures under this protocol flatter on these drives."""
+        return self.protocol.leaks_without(self.left_out)
 
     def table(self, log: Log | Sequence[Log], with_target: bool = True) -> FeatureTable:
         """Features of drives as this driver wants them.
@@ -138,13 +150,13 @@ def _foretold(
 
 
 def fit_driver(
-    drives: Log | Sequence[Log], kind: str = DEFAULT, *, name: str = "driver", protocol: Protocol | None = None,
+    drives: Log | Sequence[Log] | Mapping[str, Log], kind: str = DEFAULT, *, name: str = "driver", protocol: Protocol | None = None,
     options: Mapping[str, Any] | None = None,
 ) -> LearnedDriver:  # fmt: skip
     """Learn a driver from drives.
 
     Args:
-        drives: of this driver.
+        drives: of this driver, perhaps by name.
         kind: of model.
         name: whose.
         protocol: features and scaling; default: the honest one.
@@ -156,9 +168,25 @@ def fit_driver(
         UsageError: there is no such kind or parameter, a parameter's value cannot be, or two drives are the same recording.
     """
     protocol = protocol or Protocol()
-    logs = [drives] if isinstance(drives, Log) else list(drives)
-    refuse_twice({f"drive {k + 1} ({log.source or 'no source'})": log for k, log in enumerate(logs)})
-    return fit_table(features_of(logs, protocol.features), kind, name=name, protocol=protocol, options=options)
+    named = _named(drives)
+    refuse_twice(named)
+    table = features_of(list(named.values()), protocol.features)
+    driver = fit_table(table, kind, name=name, protocol=protocol, options=options)
+    prints = [fingerprint(log[table.target]) for log in named.values()]
+    return replace(
+        driver, training={**driver.training, "prints": prints},
+        doubts=(*doubts_about(named, table.target, protocol.features.tick), *rowless(named, table, protocol.features)),
+    )  # fmt: skip
+
+
+def _named(drives: Log | Sequence[Log] | Mapping[str, Log]) -> dict[str, Log]:
+    """Drives by name: their own, or number and source."""
+    if not isinstance(drives, Mapping):
+        return {f"drive {k + 1} ({log.source or 'no source'})": log for k, log in enumerate(drives)}
+    if isinstance(drives, Log):
+        return {drives.source or "the drive": drives}
+    named: Mapping[str, Log] = drives
+    return dict(named)
 
 
 def fit_table(
@@ -200,7 +228,7 @@ def fit_table(
     tick = protocol.features.tick if protocol.features.dense else protocol.features.dt
     training = {
         "drives": int(np.unique(table.drive).size), "rows": len(table), "minutes": len(table) * tick / 60,
-        "torque_rms": float(np.sqrt(np.mean(table.y**2))),
+        "torque_rms": float(np.sqrt(np.mean(table.y**2))), "estimated": table.estimated,
     }  # fmt: skip
     if held is not None:
         inside = (held.measured >= held.low) & (held.measured <= held.high)

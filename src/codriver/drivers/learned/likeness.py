@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from codriver.drivers.learned.features import ESTIMATED
+from codriver.drivers.learned.fingerprint import learnt_from
 from codriver.drivers.learned.learned_driver import LearnedDriver, TorquePrediction
 from codriver.finding import Finding
+from codriver.signals import Log
 
+_OWN = (
+    "this drive, or a part of it, is one that {name} learnt from: how well it is foretold says nothing of other drives"
+)
 _STRANGE = 0.85  # share inside the 95 % band below which a drive does not look like this driver's
 
 
@@ -29,6 +35,29 @@ def doubts_of(driver: LearnedDriver, made: TorquePrediction) -> list[Finding]:
     # Who was no better than that on his own drives says nothing by it.
     if rmse > stays and not own >= own_stays:
         found.append(Finding("bad", f"worse than 'the torque stays', {rmse:.3f} against {stays:.3f} N m: {_WHY}"))
+    return found
+
+
+def unfair(driver: LearnedDriver, log: Log) -> list[Finding]:
+    """Why what a driver does on a drive must not be taken as his due: he learnt from it, or from another kind of torque.
+
+    Args:
+        driver: who foretells.
+        log: the drive; has his torque.
+    """
+    found = []
+    torque = log[driver.target]
+    if learnt_from(torque, driver.training.get("prints", ())):
+        found.append(Finding("bad", _OWN.format(name=driver.name)))
+    estimated = torque.source.startswith(ESTIMATED)
+    if "estimated" in driver.training and estimated != driver.training["estimated"]:
+        mine, its = ("measured", "an estimate") if estimated else ("an estimate", "measured")
+        found.append(
+            Finding(
+                "warn", f"the torque {driver.name} learnt from was {mine}, that of this drive is {its}: errors of the estimate are "
+                "in all figures; learn and judge on the same kind",
+            )
+        )  # fmt: skip
     return found
 
 

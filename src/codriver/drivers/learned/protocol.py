@@ -10,6 +10,7 @@ Okamoto, Tsiotras 2019 (Robotics and Autonomous Systems), section 5.2.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -67,6 +68,10 @@ class Protocol:
         if self.gap == 0 and self.hold_out != "drives":
             found.append("no gap between training and judged blocks: rows on either side of an edge share their past")
         return tuple(found)
+
+    def leaks_without(self, left_out: Collection[str]) -> tuple[str, ...]:
+        """The leaks on drives that lack some signals."""
+        return self.with_features(current=tuple(n for n in self.features.current if n not in left_out)).leaks
 
     def with_features(self, **changes: object) -> Protocol:
         """The same with other features."""

@@ -16,9 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from codriver.drivers.learned.evaluate import block_means
+from codriver.drivers.learned.features import FeatureTable
 from codriver.drivers.learned.learned_driver import LearnedDriver
-from codriver.drivers.learned.likeness import doubts_of
-from codriver.errors import LogError, UsageError
+from codriver.drivers.learned.likeness import doubts_of, unfair
+from codriver.errors import LogError, MissingSignal, UsageError
+from codriver.finding import Finding
 from codriver.signals import Log
 
 DRAWS = 2000
@@ -38,6 +40,7 @@ class Likeness:
         rmse: N m.
         inside95: share of the torques in the driver's 95 % band.
         like_own: whether that is what his own drives would give.
+        unfair: why he cannot be held against the others on this drive; empty where he can.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Likeness:
     rmse: float
     inside95: float
     like_own: bool
+    unfair: tuple[Finding, ...] = ()
 
 
 def recognise(log: Log, drivers: Sequence[LearnedDriver], *, seed: int = 0) -> list[Likeness]:
@@ -66,7 +70,7 @@ def recognise(log: Log, drivers: Sequence[LearnedDriver], *, seed: int = 0) -> l
         LogError: the drive is too short.
     """
     _refuse_unlike(drivers)
-    tables = [d.table(log) for d in drivers]
+    tables = [_table(d, log) for d in drivers]
     # Drivers may use different signals; only moments that all can tell of are compared.
     common = np.unique(np.round(tables[0].time, 6))
     for table in tables[1:]:
@@ -99,9 +103,27 @@ def recognise(log: Log, drivers: Sequence[LearnedDriver], *, seed: int = 0) -> l
             Likeness(
                 driver.name, driver.kind, float(means[k]), float(means[best] - means[k]), float(low), float(high),
                 float(shares[k]), float(np.sqrt(np.mean(errors[k] ** 2))), inside[k], like[k],
+                tuple(unfair(driver, log)),
             )
         )  # fmt: skip
     return sorted(found, key=lambda one: -one.log_density)
+
+
+def _table(driver: LearnedDriver, log: Log) -> FeatureTable:
+    """A driver's rows of the drive.
+
+    Raises:
+        MissingSignal, LogError: he cannot tell of it; he is named.
+    """
+    try:
+        return driver.table(log)
+    except MissingSignal as error:
+        raise MissingSignal(
+            f"{driver.name} needs what {log.source or 'the drive'} lacks: {error.found}", "a drive with every driver's signals",
+            f"map that signal in the names file, leave {driver.name} out, or fit {driver.name} on drives without it",
+        ) from error  # fmt: skip
+    except LogError as error:
+        raise LogError(f"{driver.name}: {error.found}", error.expected, error.do) from error
 
 
 def _refuse_unlike(drivers: Sequence[LearnedDriver]) -> None:

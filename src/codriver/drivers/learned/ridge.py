@@ -3,7 +3,8 @@
     f(z) = y_0 + w' (z - z_0),      w = (Z'Z + alpha I)^-1 Z' (y - y_0)
     sd(z) = s sqrt(1 + 1/n + (z - z_0)' (Z'Z + alpha I)^-1 (z - z_0))
 
-z_0, y_0 are the means of the training rows, Z their features less z_0; the offset is not shrunk.
+z_0, y_0 are the means of the training rows, Z their features less z_0; the offset is not shrunk. A feature that does not vary has
+the weight 0, and what is smaller than the rounding of the largest weight is 0 too.
 
 alpha is chosen by leaving out blocks of rows (`blocks`): for every block one singular value decomposition of the rest,
 Z = U S V', gives the error at all alpha at once,
@@ -30,6 +31,7 @@ from codriver.kernel import Scalar, sqrt
 from codriver.signals.signal import Array
 
 ALPHAS = np.logspace(-5, 6, 45)  # tried, for standardised features
+_LEAST = 1e-9  # a column that varies less than this counts as constant
 
 
 class Decomposed(NamedTuple):
@@ -103,7 +105,8 @@ class RidgeRegressor(TorqueRegressor):
         self.left_out_ = errors[best]
         self.sd_ = float(np.sqrt(np.mean(errors[best] ** 2 / relative[best])))
         whole = decompose(X, y)
-        self._take(whole.z_0, whole.y_0, whole.weights(self.alpha_), whole.spread(self.alpha_), whole.n)
+        weights = np.where(X.std(axis=0) > _LEAST, whole.weights(self.alpha_), 0.0)
+        self._take(whole.z_0, whole.y_0, without_dust(weights), without_dust(whole.spread(self.alpha_)), whole.n)
         return self
 
     def _left_out(self, X: Array, y: Array, alphas: Array, lengths: Sequence[int] | None) -> tuple[Array, Array]:
@@ -154,6 +157,11 @@ class RidgeRegressor(TorqueRegressor):
         mean = self.offset_ + dot(self.coef_, off)
         parts = [dot(row, off) for row in self.spread_]
         return {}, mean, self.sd_ * sqrt(1.0 + 1.0 / self.rows_ + sum(part * part for part in parts))
+
+
+def without_dust(weights: Array) -> Array:
+    """Weights, with 0 for those that are smaller than the rounding of the largest; single precision cannot even hold some."""
+    return np.where(np.abs(weights) > np.finfo(np.float64).eps * np.abs(weights).max(initial=0.0), weights, 0.0)
 
 
 def dot(weights: Array, values: Sequence[Scalar]) -> Scalar:

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from codriver.drivers.learned.feature_setting import HONEST, FeatureSetting
+from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
 
 
@@ -33,3 +35,28 @@ def curvature_ahead(curvature: Array, speed: Array, dt: float, times: tuple[floa
     where = place[:, None] + np.where(np.isfinite(speed), speed, np.nan)[:, None] * np.asarray(times)
     found = np.interp(where, place[known], curvature[known], right=np.nan)
     return np.where(np.isfinite(where), found, np.nan)
+
+
+def with_road_ahead(log: Log, setting: FeatureSetting = HONEST) -> Log:
+    """A drive with the road ahead as a map would give it: what `observer_of` asks for and a recording does not hold.
+
+    Args:
+        log: has road_curvature and longitudinal_speed.
+        setting: of the driver's features (`driver.protocol.features`), for the tick and how far ahead.
+
+    Returns:
+        the log with road_curvature_ahead_1, ..., 1/m, a value a tick from the log's start.
+
+    Raises:
+        MissingSignal: the log lacks the curvature or the speed.
+    """
+    names = ("road_curvature", "longitudinal_speed")
+    for name in names:
+        log[name]
+    grid = log.sample(names, setting.tick, start=log.start)
+    curvature, speed = (np.where(grid.held[name], grid.values[name], np.nan) for name in names)
+    ahead = curvature_ahead(curvature, speed, setting.tick, setting.previews)
+    return log.with_signals(*(
+        Signal(f"road_curvature_ahead_{k + 1}", grid.time, column, "1/m", "derived: road curvature over distance")
+        for k, column in enumerate(ahead.T)
+    ))  # fmt: skip
