@@ -107,6 +107,14 @@ _TWO_WHEELER: dict[str, Known] = {
     "rear_relaxation_length": Known("m", 1e-3, 5, False, "sigma_r, over which the rear tyre builds up its force"),
     "steer_damping": Known("N*m*s/rad", 0, 100, False, "K, of a two-wheeler's steering damper"),
     "front_wheel_load": Known("N", 0, 2e4, False, "-Z_f, static load of the front wheel"),
+    "front_crown_radius": Known("m", 0, 0.2, False, "rho_f, of the front tyre's round section (Cossalter 2006); 0.05"),
+    "rear_crown_radius": Known("m", 0, 0.3, False, "rho_r, of the rear tyre's round section; 0.09"),
+    "pneumatic_trail": Known("m", 0, 0.2, False, "t_p, of both tyres' lateral force behind the contact; 0.02"),
+    "imu_forward": Known(
+        "m", -2, 3, False, "X of the IMU, ahead of the road point below the rear frame's mass centre; 0"
+    ),
+    "imu_left": Known("m", -1, 1, False, "n of the IMU, to the left of the frame's plane; 0"),
+    "imu_height": Known("m", 0, 2, False, "Z of the IMU, above the road when upright; 0.8"),
     "rear_wheel_mass": Known("kg", 0, 200, False, "m_R"),
     "rear_wheel_inertia": Known("kg*m^2", 0, 10, False, "I_Rxx, of the rear wheel about a diameter"),
     "frame_forward": Known("m", -1, 5, False, "x_B, of frame and rider's mass centre in front of the rear contact"),

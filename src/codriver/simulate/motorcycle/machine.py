@@ -1,45 +1,45 @@
-"""Equations of motion of the simulated motorcycle, Lagrange's, from its kinetic energy; the derivatives by casadi.
+"""The simulated motorcycle: state, inputs, equations of motion (`motion`), forces (`forces`), compiled (`compiled`).
 
-    d/dt (dT/du) - dT/dq = Q,   T = sum m v^2 / 2 + w I w / 2 + i_w (w_w . axle)^2 / 2
-    sigma / V F' + F = F_0       the tyre's forces, `tyre`
+In: any roll, pitch and steer; heave and pitch on the tyres' radial springs and, if wished, fork and rear spring, so load transfer;
+toroidal tyres; magic-formula forces with relaxation, camber, saturation, load; both wheels' spin and longitudinal slip, drive and
+brakes; drag of the air; pneumatic trail; steer damper; a rider who leans beside the machine, if wished; a road whose bank changes
+and that turns. Not in: flexible frame, chain, end stops, unevenness, lift of the air. Contacts are frictionless to turning
+about the normal, apart from the trail.
 
-In: any roll, pitch and steer; heave and pitch on radial tyre springs, so load transfer; toroidal tyres; magic-formula forces with
-relaxation, camber, saturation, load; both wheels' spin and longitudinal slip, drive torque and brakes; drag of the air; pneumatic
-trail; steer damper; road bank. Not in: suspension beside the tyres' springs, leaning rider, flexible frame, chain, unevenness,
-curvature of the road's surface. Contacts are frictionless to turning about the normal, apart from the trail.
-
-State: q[0:7], u (9), then longitudinal force front and rear, lateral force front and rear, N.
+State: q[0:10], u (12), then longitudinal force front and rear, lateral force front and rear, N.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
 
 from codriver.signals.signal import Array
-from codriver.simulate.motorcycle.kinematics import UP, Pose, WheelPose, pose
-from codriver.simulate.motorcycle.parameters import MachineParameters, TyreParameters
-from codriver.simulate.motorcycle.tyre import steady_forces
+from codriver.simulate.motorcycle.compiled import Code, compiled
+from codriver.simulate.motorcycle.forces import forces, potential_energy
+from codriver.simulate.motorcycle.kinematics import COORDINATES, UP, pose, turn
+from codriver.simulate.motorcycle.motion import Flow, angular_momentum, inertia_and_rest, kinetic_energy
+from codriver.simulate.motorcycle.parameters import MachineParameters
 
+_PLACES = 10  # the turn of the wheels is no state
 STATES = (
-    "x", "y", "z", "yaw", "roll", "pitch", "steer",
-    "x_rate", "y_rate", "z_rate", "yaw_rate", "roll_rate", "pitch_rate", "steer_rate", "front_spin_rate", "rear_spin_rate",
-    "front_longitudinal_force", "rear_longitudinal_force", "front_lateral_force", "rear_lateral_force",
+    *COORDINATES[:_PLACES], *(f"{name}_rate" for name in COORDINATES), "front_longitudinal_force", "rear_longitudinal_force",
+    "front_lateral_force", "rear_lateral_force",
 )  # fmt: skip
 INPUTS = (
-    "rider_torque",
-    "drive_torque",
-    "front_brake_torque",
-    "bank",
-)  # N m, to the left; forward; backward; rad, to the right
+    "rider_torque", "drive_torque", "front_brake_torque", "lean_torque", "roll_moment", "bank", "road_roll_rate",
+    "road_turn_rate", "road_roll_acceleration", "heading_error",
+)  # fmt: skip
+# N m: hands, to the left; forward; backward; hips and feet, to the right. Then of the road: its bank, rad, to the right, and the
+# bank's rates, rad/s, rad/s^2; the turn of its course, rad/s, to the left; the machine's heading less the course's, rad.
 OUTPUTS = (
     "body_roll_rate", "body_pitch_rate", "body_yaw_rate", "force_x", "force_y", "force_z", "front_load", "rear_load",
     "front_tan_slip", "rear_tan_slip",
 )  # fmt: skip
-SLOWEST = 1.0  # m/s in the slips' denominators
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,51 +57,37 @@ class Machine:
     grip: bool = True
 
     @cached_property
-    def _functions(self) -> tuple[ca.Function, ca.Function, ca.Function]:
-        x, inputs = ca.SX.sym("x", len(STATES)), ca.SX.sym("inputs", len(INPUTS))
-        q, u = ca.SX.sym("q", 9), ca.SX.sym("u", 9)
-        at = pose(self.parameters, q, u)
-        energy = kinetic_energy(at)
-        momentum = ca.gradient(energy, u)
-        mass = ca.jacobian(momentum, u)
-        forces, relaxing, loads, slips = self._forces(at, u, x[16:], inputs)
-        rest = ca.gradient(energy, q) - ca.jtimes(momentum, q, u) + forces
-        diagonal, upper, order = ca.ldl(mass)
-        turned = ca.ldl_solve(rest, diagonal, upper, order)
-        specific = (
-            ca.jtimes(at.imu_velocity, q, u) + ca.jtimes(at.imu_velocity, u, turned) - self._gravity(q, inputs[3])
-        )
-        out = ca.vertcat(at.rear.rotation.T @ at.rear.rate, at.rear.rotation.T @ specific, loads, slips)
-        place = [ca.vertcat(x[:7], 0, 0), x[7:16]]
-
-        def of_state(expression: ca.SX) -> ca.SX:
-            return ca.substitute([expression], [q, u], place)[0]
-
-        rate = ca.Function("rate", [x, inputs], [of_state(ca.vertcat(u[:7], turned, relaxing))])
-        output = ca.Function("output", [x, inputs], [of_state(out)])
-        conserved = ca.Function(
-            "conserved", [x], [of_state(ca.vertcat(energy + self._potential(at), angular_momentum(at)))]
-        )
-        return rate, output, conserved
+    def _rate(self) -> Callable[[Array, Array], Array]:
+        return _code(self.parameters, self.road, self.grip)[0].call()
 
     @cached_property
-    def _step(self) -> ca.Function:
-        rate = self._functions[0]
-        x, inputs, dt = ca.MX.sym("x", len(STATES)), ca.MX.sym("inputs", len(INPUTS)), ca.MX.sym("dt")
-        k1 = rate(x, inputs)
-        k2 = rate(x + dt / 2 * k1, inputs)
-        k3 = rate(x + dt / 2 * k2, inputs)
-        k4 = rate(x + dt * k3, inputs)
-        return ca.Function("step", [x, inputs, dt], [x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+    def _output(self) -> Callable[[Array, Array], Array]:
+        return _code(self.parameters, self.road, self.grip)[1].call()
+
+    @cached_property
+    def _linear(self) -> ca.Function:
+        x, w = ca.MX.sym("x", len(STATES)), ca.MX.sym("w", len(INPUTS))
+        value = _functions(self.parameters, self.road, self.grip)[0](x, w)
+        return ca.Function("linear", [x, w], [ca.jacobian(value, x), ca.jacobian(value, w)])
+
+    @cached_property
+    def _conserved(self) -> ca.Function:
+        x = ca.SX.sym("x", len(STATES))
+        q, u = ca.vertcat(x[:_PLACES], 0, 0), x[10:22]
+        q_, u_ = ca.SX.sym("q", 12), ca.SX.sym("u", 12)
+        at = pose(self.parameters, q_, u_)
+        energy = kinetic_energy(at) + potential_energy(self.parameters, at, q_, road=self.road)
+        both = ca.substitute([ca.vertcat(energy, angular_momentum(at))], [q_, u_], [q, u])
+        return ca.Function("conserved", [x], both)
 
     def rate(self, state: Array, inputs: Array) -> Array:
-        """x', shape (20,).
+        """x', shape (26,).
 
         Args:
             state: see `STATES`.
             inputs: see `INPUTS`.
         """
-        return np.asarray(self._functions[0](state, inputs)).ravel()
+        return self._rate(state, inputs)
 
     def step(self, state: Array, inputs: Array, dt: float = 1e-3) -> Array:
         """The state a step later, by Runge and Kutta's fourth order; the inputs are held.
@@ -111,7 +97,11 @@ class Machine:
             inputs: see `INPUTS`.
             dt: s.
         """
-        return np.asarray(self._step(state, inputs, dt)).ravel()
+        k1 = self._rate(state, inputs)
+        k2 = self._rate(state + dt / 2 * k1, inputs)
+        k3 = self._rate(state + dt / 2 * k2, inputs)
+        k4 = self._rate(state + dt * k3, inputs)
+        return state + dt / 6 * (k1 + 2 * (k2 + k3) + k4)
 
     def output(self, state: Array, inputs: Array) -> Array:
         """What an ideal IMU and the tyres show: `OUTPUTS`, rad/s and m/s^2 in body axes, N.
@@ -120,26 +110,24 @@ class Machine:
             state: see `STATES`.
             inputs: see `INPUTS`.
         """
-        return np.asarray(self._functions[1](state, inputs)).ravel()
+        return self._output(state, inputs)
 
     def conserved(self, state: Array) -> Array:
-        """Energy, J, and angular momentum about the mass centre, N m s, shape (4,). Energy has the tyres' springs, level road.
+        """Energy, J, and angular momentum about the mass centre, N m s, shape (4,). Energy has all springs, level road.
 
         Args:
             state: see `STATES`.
         """
-        return np.asarray(self._functions[2](state)).ravel()
+        return np.asarray(self._conserved(state)).ravel()
 
     def linearised(self, state: Array, inputs: Array) -> tuple[Array, Array]:
-        """df/dx and df/dinputs, shapes (20, 20) and (20, 4).
+        """df/dx and df/dinputs, shapes (26, 26) and (26, 10).
 
         Args:
             state: see `STATES`.
             inputs: see `INPUTS`.
         """
-        x, w = ca.MX.sym("x", len(STATES)), ca.MX.sym("w", len(INPUTS))
-        value = self._functions[0](x, w)
-        both = ca.Function("linear", [x, w], [ca.jacobian(value, x), ca.jacobian(value, w)])(state, inputs)
+        both = self._linear(state, inputs)
         return np.asarray(both[0]), np.asarray(both[1])
 
     def upright(self, speed: float) -> Array:
@@ -150,108 +138,59 @@ class Machine:
         """
         p = self.parameters.sharp
         state = np.zeros(len(STATES))
-        state[2], state[7] = p.h, speed
-        state[14:16] = speed / p.Rf, speed / p.Rr
+        state[STATES.index("z")], state[STATES.index("x_rate")] = p.h, speed
+        state[STATES.index("front_spin_rate")], state[STATES.index("rear_spin_rate")] = speed / p.Rf, speed / p.Rr
         return state
 
-    def _gravity(self, q: ca.SX, bank: ca.SX) -> ca.SX:
-        side = ca.sin(bank)
-        return self.parameters.sharp.g * ca.vertcat(ca.sin(q[3]) * side, -ca.cos(q[3]) * side, -ca.cos(bank))
 
-    def _potential(self, at: Pose) -> ca.SX:
-        p, g = self.parameters, self.parameters.sharp.g
-        total = g * (at.rear.mass * at.rear.centre[2] + at.front.mass * at.front.centre[2])
-        if self.road:
-            for wheel, tyre in ((at.front_wheel, p.front), (at.rear_wheel, p.rear)):
-                total += tyre.radial_stiffness * ca.fmax(-wheel.contact[2], 0) ** 2 / 2
-        return total
-
-    def _forces(self, at: Pose, u: ca.SX, tyres: ca.SX, inputs: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-        """Generalised forces; the tyre forces' rates; loads; tan(alpha) of both tyres."""
-        m, p = self.parameters, self.parameters.sharp
-        generalised = ca.SX.zeros(9)
-
-        def push(velocity: ca.SX, force: ca.SX) -> ca.SX:
-            return ca.jacobian(velocity, u).T @ force
-
-        q = ca.vertcat(ca.SX.zeros(3), ca.atan2(at.rear_wheel.forward[1], at.rear_wheel.forward[0]))
-        gravity = self._gravity(q, inputs[3])
-        for frame in (at.rear, at.front):
-            generalised += push(frame.velocity, frame.mass * gravity)
-        if self.grip:
-            drag = -m.air_density * m.drag_area / 2 * ca.norm_2(at.rear.velocity + 1e-9) * at.rear.velocity
-            generalised += push(at.rear.velocity, drag)
-        generalised[6] += inputs[0] - p.K * u[6]
-        generalised[7] -= inputs[2]
-        generalised[8] += inputs[1]
-        if not self.road:
-            return generalised, ca.SX.zeros(4), ca.SX.zeros(2), ca.SX.zeros(2)
-        sides = (
-            (at.front_wheel, m.front, (p.Cf1, p.Cf2), p.sf, at.front.rate),
-            (at.rear_wheel, m.rear, (p.Cr1, p.Cr2), p.sr, at.rear.rate),
-        )
-        rates, loads, slips = [ca.SX.zeros(2), ca.SX.zeros(2)], [], []
-        for i, (wheel, tyre, stiffnesses, length, turning) in enumerate(sides):
-            load = normal_load(wheel, tyre)
-            loads.append(load)
-            force = load * UP
-            speed = ca.fmax(ca.dot(wheel.hub_velocity, wheel.forward), SLOWEST)
-            tan_slip = ca.dot(wheel.contact_velocity, wheel.left) / speed
-            slips.append(tan_slip)
-            if self.grip:
-                kappa = -ca.dot(wheel.contact_velocity, wheel.forward) / speed
-                along, side = tyres[i], tyres[2 + i]
-                wanted = steady_forces(
-                    ca.fmax(load, 1.0), tan_slip, wheel.camber, kappa, along, m.loads[i], stiffnesses, tyre
-                )
-                rates[0][i] = speed / length * (wanted[0] - along)
-                rates[1][i] = speed / length * (wanted[1] - side)
-                force += along * wheel.forward + side * wheel.left
-                generalised += push(turning, -wanted[2] * side * UP)
-            generalised += push(wheel.contact_velocity, force)
-        return generalised, ca.vertcat(*rates), ca.vertcat(*loads), ca.vertcat(*slips)
+@lru_cache(maxsize=8)
+def _code(parameters: MachineParameters, road: bool, grip: bool) -> tuple[Code, Code]:
+    """`_functions` as machine code: the same machine is compiled once."""
+    rate, output = _functions(parameters, road, grip)
+    return compiled(rate), compiled(output)
 
 
-def normal_load(wheel: WheelPose, tyre: TyreParameters) -> ca.SX:
-    """A tyre's load, N: spring and damper while it is pressed, never pulling.
+def _functions(parameters: MachineParameters, road: bool, grip: bool) -> tuple[ca.Function, ca.Function]:
+    """Rates of the states, and `OUTPUTS`. Worked out in the heading's axes: the yaw angle is 0 there."""
+    x, inputs = ca.SX.sym("x", len(STATES)), ca.SX.sym("inputs", len(INPUTS))
+    q, u = ca.SX.sym("q", 12), ca.SX.sym("u", 12)
+    flow = Flow(q, u, ca.SX.sym("road", 3), ca.SX.sym("road_rate", 3))
+    at = pose(parameters, q, u)
+    given = {name: inputs[i] for i, name in enumerate(INPUTS)}
+    course, bank = turn(UP, -given["heading_error"]), given["bank"]
+    gravity = parameters.sharp.g * course @ ca.vertcat(0, -ca.sin(bank), -ca.cos(bank))
+    acting = forces(parameters, at, q, u, x[22:], given, gravity, road=road, grip=grip)
+    mass, rest = inertia_and_rest(at, flow)
+    imu = flow.acceleration(at.imu, at.imu_velocity) - gravity, ca.jacobian(at.imu_velocity, u)
+    heading = turn(UP, x[3])
+    free = [q, u, flow.road, flow.road_rate]
+    level = [
+        ca.vertcat(0, 0, x[2], 0, x[4:_PLACES], 0, 0), ca.vertcat(heading.T @ x[10:13], x[13:22]),
+        *_road_motion(course, given),
+    ]  # fmt: skip
+    wanted = [
+        mass, acting.generalised - rest, acting.relaxing, at.rear.rotation, at.rear.rate + flow.road, *imu, acting.loads,
+        acting.slips,
+    ]  # fmt: skip
+    mass, pushed, relaxing, rotation, rate, specific, lever, loads, slips = ca.substitute(wanted, free, level)
+    diagonal, upper, order = ca.ldl(mass)
+    turned = ca.ldl_solve(pushed, diagonal, upper, order)
+    out = ca.vertcat(rotation.T @ rate, rotation.T @ (specific + lever @ turned), loads, slips)
+    moving = ca.vertcat(x[10:20], heading @ turned[:3], turned[3:], relaxing)
+    return ca.Function("rate", [x, inputs], [ca.cse(moving)]), ca.Function("output", [x, inputs], [ca.cse(out)])
+
+
+def _road_motion(course: ca.SX, given: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX]:
+    """How a banked road's frame turns beside its turn about the normal, and the rate of that, in the heading's axes.
+
+    The course turns about the vertical, which leans to the left by the bank: r / cos(beta) about it is r about the normal and
+    r tan(beta) about the left. With r steady.
 
     Args:
-        wheel: where it is.
-        tyre: its spring and damper.
+        course: rotation from the course's axes.
+        given: inputs by name.
     """
-    pressed = -wheel.contact[2]
-    return ca.if_else(
-        pressed > 0, ca.fmax(tyre.radial_stiffness * pressed - tyre.radial_damping * wheel.contact_velocity[2], 0), 0
-    )
-
-
-def kinetic_energy(at: Pose) -> ca.SX:
-    """T, J.
-
-    Args:
-        at: the parts.
-    """
-    total = ca.SX(0)
-    for frame in (at.rear, at.front):
-        total += (
-            frame.mass * ca.dot(frame.velocity, frame.velocity) / 2 + ca.dot(frame.rate, frame.inertia @ frame.rate) / 2
-        )
-    for wheel in (at.front_wheel, at.rear_wheel):
-        total += wheel.spin_inertia * ca.dot(wheel.rate, wheel.axle) ** 2 / 2
-    return total
-
-
-def angular_momentum(at: Pose) -> ca.SX:
-    """Of the whole machine about its mass centre, N m s, in the world's axes.
-
-    Args:
-        at: the parts.
-    """
-    mass = at.rear.mass + at.front.mass
-    centre = (at.rear.mass * at.rear.centre + at.front.mass * at.front.centre) / mass
-    total = ca.SX.zeros(3)
-    for frame in (at.rear, at.front):
-        total += frame.inertia @ frame.rate + frame.mass * ca.cross(frame.centre - centre, frame.velocity)
-    for wheel in (at.front_wheel, at.rear_wheel):
-        total += wheel.spin_inertia * ca.dot(wheel.rate, wheel.axle) * wheel.axle
-    return total
+    bank, rolling, turning = given["bank"], given["road_roll_rate"], given["road_turn_rate"]
+    rate = ca.vertcat(rolling, turning * ca.tan(bank), 0)
+    own = ca.vertcat(given["road_roll_acceleration"], turning * rolling / ca.cos(bank) ** 2, 0)
+    return course @ rate, course @ (own + ca.cross(turning * UP, rate))

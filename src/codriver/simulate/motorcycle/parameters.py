@@ -1,4 +1,6 @@
-"""What the simulated motorcycle has beyond Sharp's letters: tyres of some width that saturate, radial springs, drag, pitch inertia.
+"""What the simulated motorcycle has beyond Sharp's letters: tyres of some width that saturate, springs, a rider's body, drag.
+
+Suspension and upper body are taken out of Sharp's frames (`masses`): with both at rest the machine is his as before.
 
 Defaults are of the order that road tyres and machines have; none is taken from a measured machine.
 """
@@ -43,6 +45,45 @@ REAR_TYRE = TyreParameters(crown=0.09)
 
 
 @dataclass(frozen=True)
+class Suspension:
+    """Telescopic fork along the steer axis, rear wheel along the rear frame's upright; the springs hold the machine at no travel.
+
+    Attributes:
+        front_unsprung, rear_unsprung: mass that goes with the wheels, a point at the hub, kg.
+        front_stiffness, rear_stiffness: at the wheel, N/m.
+        front_damping, rear_damping: N s/m.
+    """
+
+    front_unsprung: float = 12.0
+    rear_unsprung: float = 18.0
+    front_stiffness: float = 13e3
+    rear_stiffness: float = 22e3
+    front_damping: float = 900.0
+    rear_damping: float = 1300.0
+
+
+@dataclass(frozen=True)
+class UpperBody:
+    """The rider from the hips up: leans to either side about an axis along the rear frame.
+
+    Attributes:
+        mass: kg.
+        hip: in front of the rear frame's mass centre, and above the road, m.
+        above: mass centre above the hip, m.
+        inertia: about its mass centre: roll, pitch, yaw, kg m^2.
+        stiffness: of the hips, N m/rad; must hold the body up against its weight.
+        damping: N m s/rad.
+    """
+
+    mass: float = 45.0
+    hip: tuple[float, float] = (-0.1, 0.75)
+    above: float = 0.3
+    inertia: tuple[float, float, float] = (2.2, 2.0, 0.8)
+    stiffness: float = 350.0
+    damping: float = 35.0
+
+
+@dataclass(frozen=True)
 class MachineParameters:
     """The simulated motorcycle.
 
@@ -52,6 +93,8 @@ class MachineParameters:
         rear_pitch_inertia, front_pitch_inertia: of the frames about their mass centres, without the wheels' spin inertia, kg m^2.
         drag_area: of the air's drag, at the rear frame's mass centre, m^2.
         air_density: kg/m^3.
+        suspension: None for wheels that are rigid in their frames.
+        upper_body: None for a rider who sits still.
         imu: place of the IMU in the rear frame, from the road point below its mass centre when upright, m: forward, left, up.
     """
 
@@ -62,6 +105,8 @@ class MachineParameters:
     front_pitch_inertia: float = 1.2
     drag_area: float = 0.6
     air_density: float = 1.2
+    suspension: Suspension | None = None
+    upper_body: UpperBody | None = None
     imu: tuple[float, float, float] = (0.1, 0.03, 0.8)
 
     @property

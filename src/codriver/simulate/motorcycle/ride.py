@@ -2,19 +2,29 @@
 
 Truth in the observers' terms (`models.motorcycle`): roll, steer, their rates, yaw rate about the road's normal, lateral velocity of
 the road point, tyre forces, rider torque, speed; and the IMU's ideal signals in body axes.
+
+A banked road leans to the right of its course by beta(s). Its frame turns with the course about the vertical, of which the machine
+on its flat ground knows only the part about the normal; the rest is added to all that feels inertia:
+
+    w_r = (beta', kappa s' tan beta, 0) in the course's axes
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import cos, hypot
 
 import numpy as np
 
 from codriver.errors import UsageError
 from codriver.signals.signal import Array
 from codriver.simulate.motorcycle.machine import INPUTS, OUTPUTS, STATES
-from codriver.simulate.motorcycle.rider import Rider, road_state
+from codriver.simulate.motorcycle.rider import ROLL, X_RATE, Y_RATE, YAW, Rider, road_point, road_state
+
+_ROAD = INPUTS.index("bank")
+_FALLEN = 1.2  # rad
+_BANK_STEP = 0.5  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,10 +33,11 @@ class Ride:
 
     Attributes:
         time: s, shape (n,).
-        states: shape (n, 20), `machine.STATES`.
-        inputs: held from this tick to the next, shape (n, 4), `machine.INPUTS`.
+        states: shape (n, 26), `machine.STATES`.
+        inputs: held from this tick to the next, shape (n, 10), `machine.INPUTS`.
         outputs: shape (n, 10), `machine.OUTPUTS`.
         linear: shape (n, 8), in the linear model's terms, `models.motorcycle.STATES`.
+        distance, offset: of the road point along the course and to the left of it, m, shape (n,).
         rider: who rode.
     """
 
@@ -35,6 +46,8 @@ class Ride:
     inputs: Array
     outputs: Array
     linear: Array
+    distance: Array
+    offset: Array
     rider: Rider
 
     def of(self, name: str) -> Array:
@@ -54,49 +67,67 @@ class Ride:
         return np.hypot(self.of("x_rate"), self.of("y_rate"))
 
 
-def level(_time: float) -> float:
+def level(_distance: float) -> float:
     """A road without bank.
 
     Args:
-        _time: s.
+        _distance: m.
     """
     return 0.0
 
 
-def ride(rider: Rider, duration: float, dt: float = 1e-3, bank: Callable[[float], float] = level) -> Ride:
-    """Let a rider ride from x = 0, upright, along the path's start.
+def ride(
+    rider: Rider, duration: float, dt: float = 1e-3, bank: Callable[[float], float] = level, every: int = 1
+) -> Ride:  # fmt: skip
+    """Let a rider ride from the course's start, upright, at the speed wanted there.
 
     Args:
-        rider: with machine, path and speed.
+        rider: with machine, course and speed.
         duration: s.
         dt: of a tick, s.
-        bank: of the road against time, rad, to the right; roll is from the road's normal. The rider does not know it.
+        bank: of the road against distance, rad, to the right, smooth; roll is from the road's normal. The rider does not know it.
+        every: how many ticks from one that is kept to the next.
 
     Raises:
         UsageError: the machine fell.
     """
-    count = round(duration / dt)
     rider.begin()
-    height = rider.machine.parameters.sharp.h
-    state = rider.machine.upright(rider.speed(0.0))
-    state[1] = rider.path(0.0)
-    states, inputs, outputs = (
-        np.empty((count, len(STATES))),
-        np.empty((count, len(INPUTS))),
-        np.empty((count, len(OUTPUTS))),
-    )
-    for i in range(count):
-        states[i] = state
-        inputs[i] = rider.inputs(i * dt, state, dt)
-        inputs[i, 3] = bank(i * dt)
-        outputs[i] = rider.machine.output(state, inputs[i])
-        state = rider.machine.step(state, inputs[i], dt)
-        if not abs(state[4]) < 1.2:
+    machine, height = rider.machine, rider.machine.parameters.sharp.h
+    count = (round(duration / dt) + every - 1) // every
+    state = machine.upright(rider.speed(0.0, 0.0))
+    state[:2] += rider.path.at(0.0)[:2]
+    state[YAW] = rider.path.at(0.0)[2]
+    state[X_RATE], state[Y_RATE] = state[X_RATE] * np.cos(state[YAW]), state[X_RATE] * np.sin(state[YAW])
+    states, inputs = np.empty((count, len(STATES))), np.empty((count, len(INPUTS)))
+    outputs, along = np.empty((count, len(OUTPUTS))), np.empty((count, 2))
+    for i in range(count * every):
+        given = rider.inputs(i * dt, state, dt)
+        given[_ROAD:] = _road(rider, state, bank)
+        if i % every == 0:
+            k = i // every
+            states[k], inputs[k], outputs[k] = state, given, machine.output(state, given)
+            along[k] = rider.path.locate(*road_point(height, state), rider.distance)
+        state = machine.step(state, given, dt)
+        if not abs(state[ROLL]) < _FALLEN:
             raise UsageError(
-                found=f"the motorcycle fell: roll {state[4]:.2f} rad after {i * dt:.1f} s",
-                expected="a roll below 1.2 rad",
+                found=f"the motorcycle fell: roll {state[ROLL]:.2f} rad after {i * dt:.1f} s",
+                expected=f"a roll below {_FALLEN:g} rad",
                 do="ask for less lateral acceleration",
             )
     linear = np.array([road_state(height, row) for row in states])
-    time = np.asarray(np.arange(count) * dt, dtype=np.float64)
-    return Ride(time, states, inputs, outputs, linear, rider)
+    time = np.asarray(np.arange(count) * (dt * every), dtype=np.float64)
+    return Ride(time, states, inputs, outputs, linear, along[:, 0], along[:, 1], rider)
+
+
+def _road(rider: Rider, state: Array, bank: Callable[[float], float]) -> tuple[float, float, float, float, float]:
+    """The last five of `INPUTS` here."""
+    if bank is level:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    place, d = rider.distance, _BANK_STEP
+    before, here, after = bank(place - d), bank(place), bank(place + d)
+    heading, bend = rider.path.at(place)[2:]
+    error = state[YAW] - heading
+    _, offset = rider.path.locate(*road_point(rider.machine.parameters.sharp.h, state), place)
+    ahead = hypot(state[X_RATE], state[Y_RATE]) * cos(error) / (1 - bend * offset)  # along the course, m/s
+    slope, curve = (after - before) / (2 * d), (after - 2 * here + before) / d**2
+    return here, slope * ahead, bend * ahead, curve * ahead * ahead, error

@@ -1,10 +1,12 @@
-"""A rider who follows a path: looks ahead for the lean it needs, leans the machine with the handlebar, holds the speed.
+"""A rider who follows a course: looks ahead for the lean it needs, leans machine and body, holds the speed, puts his feet down.
 
-    a = y_p''(t + T) + k_d e' + k_p e,   phi_ref = -atan(a / g)    e = y_p - y now, m; y of the road point
-    tau = tau_ref - k(v) (x - x_ref)                               A x_ref + B tau_ref = 0 at that roll; k: Riccati, Sharp's model
-    M = (m (v_ref' + (v_ref - v) / tau_v) + drag) R                    to the rear wheel when positive, front brake when negative
+    a = kappa(s + v T) v^2 - k_d e' - k_p e,   phi_ref = -atan(a / g) / (1 + share m_b l / (m h))     e offset of the road point
+    tau: `rider_law`
+    lambda_ref = share phi_ref,   hips (k_b - m_b g l) lambda_ref     lean of the body beside the machine
+    M = (m (v_ref' + (v_ref - v) / tau_v) + drag) R                   to the rear wheel when positive, front brake when negative
+    w' = -w / T_w + noise                                             remnant, added to the torque; he does not know it
+    L = -(k_L phi + c_L phi') at a standstill, gone at `FEET_UP`      feet on the road
 
-Followed is the machine's own state: this is a means to ride, not a model of a human, who has delays and does not know tyre forces.
 The wanted roll is filtered over `smoothing`, s. One point ahead is looked at, at T s, about what the machine takes to lean.
 """
 
@@ -12,20 +14,29 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import atan, cos, hypot, sin
+from math import atan, cos, hypot, sin, sqrt
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
 
-from codriver.models.motorcycle import motorcycle_model
 from codriver.signals.signal import Array
-from codriver.simulate.motorcycle.machine import Machine
+from codriver.simulate.motorcycle.course import Course
+from codriver.simulate.motorcycle.machine import INPUTS, STATES, Machine
+from codriver.simulate.motorcycle.paths import SpeedPlan
+from codriver.simulate.motorcycle.rider_law import Hands
 
-Path = Callable[[float], float]  # lateral place, m, of the forward place x, m
-SpeedPlan = Callable[[float], float]  # m/s of the time, s
 LeanPlan = Callable[[float], float]  # rad of the time, s
-# What a state's unit is worth to the rider: roll, steer, lateral velocity, yaw rate, roll rate, steer rate, both forces.
-WORTH = np.array([4e4, 4e3, 0.0, 0.0, 1e3, 1e2, 0.0, 0.0])
+FEET_DOWN, FEET_UP = 2.5, 4.0  # m/s
+FEET = 5000.0, 800.0  # k_L, N m/rad, and c_L, N m s/rad
+FRONT_BRAKE = 0.6  # share of the front brake
+REMNANT_TIME = 0.2  # s
+RIDABLE = 3.0  # m/s, the slowest at which the handlebar is used as at speed
+(X, Y, YAW, ROLL, STEER, X_RATE, Y_RATE, YAW_RATE, ROLL_RATE, STEER_RATE, FRONT, REAR) = (
+    STATES.index(name)
+    for name in (
+        "x", "y", "yaw", "roll", "steer", "x_rate", "y_rate", "yaw_rate", "roll_rate", "steer_rate", "front_lateral_force",
+        "rear_lateral_force",
+    )
+)  # fmt: skip
 
 
 @dataclass
@@ -34,19 +45,24 @@ class Rider:
 
     Attributes:
         machine: that is ridden.
-        path: lateral place, m, against the forward one, m. A path that turns back on itself is no function of x.
-        speed: wanted, m/s, against time, s.
-        lean: wanted roll, rad, against time, s; the path is not followed then.
+        path: the course.
+        speed: wanted, m/s, against time, s, and distance along the course, m.
+        lean: wanted roll, rad, against time, s; the course is not followed then.
         preview: T, s.
         stiffness, damping: k_p, 1/s^2, and k_d, 1/s.
         smoothing: of the wanted roll, s.
         speed_time: tau_v, s.
         steepest: greatest wanted roll, rad.
         strongest: greatest torque on the handlebar, N m.
+        body: share of the roll by which the body leans further; needs an upper body.
+        delay: by which the rider acts late on what he feels, s.
+        feels_forces: whether he feels the tyres' forces.
+        remnant: sd of what his hands do beside, N m, for some `REMNANT_TIME`.
+        seed: of that.
     """
 
     machine: Machine
-    path: Path
+    path: Course
     speed: SpeedPlan
     lean: LeanPlan | None = None
     preview: float = 0.5
@@ -56,33 +72,64 @@ class Rider:
     speed_time: float = 0.7
     steepest: float = 0.8
     strongest: float = 80.0
+    body: float = 0.0
+    delay: float = 0.0
+    feels_forces: bool = True
+    remnant: float = 0.0
+    seed: int = 0
+    _noise: np.random.Generator = field(init=False, repr=False)
+    _beside: float = field(default=0.0, init=False)
     _wanted: float = field(default=0.0, init=False)
-    _gains: dict[int, tuple[Array, Array, float]] = field(default_factory=dict, init=False, repr=False)
+    _hands: Hands | None = field(default=None, init=False, repr=False)
+    _distance: float = field(default=0.0, init=False)
 
     def begin(self) -> None:
         """Forget the last ride."""
-        self._wanted = 0.0
+        self._wanted, self._distance, self._beside, self._hands = 0.0, 0.0, 0.0, None
+        self._noise = np.random.default_rng(self.seed)
+
+    @property
+    def distance(self) -> float:
+        """Along the course, m, at the last tick."""
+        return self._distance
 
     def inputs(self, time: float, state: Array, dt: float) -> Array:
-        """Torques of this tick, `machine.INPUTS`, with a level road.
+        """What the rider does in this tick, `machine.INPUTS`, on a level road.
 
         Args:
             time: s.
             state: of the machine.
             dt: since the last tick, s.
         """
-        p = self.machine.parameters.sharp
+        parameters = self.machine.parameters
+        p = parameters.sharp
+        if self._hands is None:
+            self._hands = Hands(self.machine, self.feels_forces, self.delay, dt)
         moving = road_state(p.h, state)
-        v = max(hypot(state[7], state[8]), 3.0)
+        v = hypot(state[X_RATE], state[Y_RATE])
+        self._distance = self.path.locate(*road_point(p.h, state), self._distance)[0]
         wanted = self._lean_for_path(state, v, moving[2]) if self.lean is None else self.lean(time)
         wanted = min(max(wanted, -self.steepest), self.steepest)
-        self._wanted += dt / self.smoothing * (wanted - self._wanted)
-        gain, balance, torque = self._law(v)
-        torque = self._wanted * torque - float(gain @ (moving - self._wanted * balance))
-        torque = min(max(torque, -self.strongest), self.strongest)
-        wish = (self.speed(time + 0.05) - self.speed(time)) / 0.05 + (self.speed(time) - v) / self.speed_time
-        push = p.mass * wish + self.machine.parameters.air_density * self.machine.parameters.drag_area / 2 * v * v
-        return np.array([torque, max(push, 0) * p.Rr, max(-push, 0) * p.Rf, 0.0])
+        feet = min(max((FEET_UP - v) / (FEET_UP - FEET_DOWN), 0.0), 1.0)
+        self._wanted += dt / self.smoothing * ((1 - feet) * wanted - self._wanted)
+        given = dict.fromkeys(INPUTS, 0.0)
+        torque = self._hands.torque(max(v, RIDABLE), moving, self._wanted, self.strongest)
+        if self.remnant:
+            fade = dt / REMNANT_TIME
+            self._beside += sqrt(2 * fade) * self.remnant * self._noise.standard_normal() - fade * self._beside
+        given["rider_torque"] = torque + self._beside
+        given["roll_moment"] = -feet * (FEET[0] * state[ROLL] + FEET[1] * state[ROLL_RATE])
+        body = parameters.upper_body
+        if body is not None:
+            given["lean_torque"] = (body.stiffness - body.mass * p.g * body.above) * self.body * self._wanted
+        now = self.speed(time, self._distance)
+        wish = (self.speed(time + 0.05, self._distance + 0.05 * v) - now) / 0.05 + (now - v) / self.speed_time
+        push = p.mass * wish + parameters.air_density * parameters.drag_area / 2 * v * v
+        given["drive_torque"], given["front_brake_torque"] = (
+            (max(push, 0) - (1 - FRONT_BRAKE) * max(-push, 0)) * p.Rr,
+            FRONT_BRAKE * max(-push, 0) * p.Rf,
+        )
+        return np.array([given[name] for name in INPUTS])
 
     def _lean_for_path(self, state: Array, v: float, aside: float) -> float:
         """Roll, rad, whose balanced turn brings the road point back to the path.
@@ -92,38 +139,28 @@ class Rider:
             v: speed, m/s.
             aside: lateral velocity of the road point, m/s.
         """
-        p = self.machine.parameters.sharp
-        yaw, roll = state[3], state[4]
-        x, y = state[0] - p.h * sin(roll) * sin(yaw), state[1] + p.h * sin(roll) * cos(yaw)
-        across = v * sin(yaw) + aside * cos(yaw)
-        along = v * cos(yaw)
-        place, slope, _ = along_path(self.path, x)
-        bend = along_path(self.path, x + along * self.preview)[2]
-        acceleration = bend * along**2 + self.damping * (slope * along - across) + self.stiffness * (place - y)
-        return -atan(acceleration / p.g)
-
-    def _law(self, speed: float) -> tuple[Array, Array, float]:
-        """Gain, balanced state and torque per rad of roll, at the nearest whole m/s."""
-        key = round(speed)
-        if key not in self._gains:
-            plant = motorcycle_model(self.machine.parameters.sharp)
-            A, B = plant.A(float(key)), plant.B
-            riccati = solve_continuous_are(A, B, np.diag(WORTH) + 1e-9 * np.eye(8), np.eye(1))
-            free = np.linalg.solve(np.hstack([A[:, 1:], B]), -A[:, 0])
-            self._gains[key] = ((B.T @ riccati).ravel(), np.concatenate([[1.0], free[:-1]]), float(free[-1]))
-        return self._gains[key]
+        parameters = self.machine.parameters
+        p, body = parameters.sharp, parameters.upper_body
+        x, y = road_point(p.h, state)
+        px, py, heading, _ = self.path.at(self._distance)
+        offset = cos(heading) * (y - py) - sin(heading) * (x - px)
+        turned = state[YAW] - heading
+        leaving = v * sin(turned) + aside * cos(turned)
+        bend = self.path.curvature_at(self._distance + v * self.preview)
+        acceleration = bend * v * v - self.damping * leaving - self.stiffness * offset
+        more = 0.0 if body is None else self.body * body.mass * body.above / (p.mass * p.h)
+        return -atan(acceleration / p.g) / (1 + more)
 
 
-def along_path(path: Path, x: float, step: float = 0.5) -> tuple[float, float, float]:
-    """Place, m, slope, and second derivative, 1/m, of a path, by differences.
+def road_point(height: float, state: Array) -> tuple[float, float]:
+    """The point on the road below the rear frame's mass centre were it upright, m.
 
     Args:
-        path: the path.
-        x: m.
-        step: m.
+        height: of the rear frame's mass centre, m.
+        state: `machine.STATES`.
     """
-    before, here, after = path(x - step), path(x), path(x + step)
-    return here, (after - before) / (2 * step), (after - 2 * here + before) / step**2
+    yaw, side = state[YAW], height * sin(state[ROLL])
+    return state[X] - side * sin(yaw), state[Y] + side * cos(yaw)
 
 
 def road_state(height: float, state: Array) -> Array:
@@ -133,6 +170,8 @@ def road_state(height: float, state: Array) -> Array:
         height: of the rear frame's mass centre, m.
         state: `machine.STATES`.
     """
-    yaw, roll = state[3], state[4]
-    aside = -sin(yaw) * state[7] + cos(yaw) * state[8] + height * cos(roll) * state[11]
-    return np.array([roll, state[6], aside, state[10], state[11], state[13], state[18], state[19]])
+    yaw, roll = state[YAW], state[ROLL]
+    aside = -sin(yaw) * state[X_RATE] + cos(yaw) * state[Y_RATE] + height * cos(roll) * state[ROLL_RATE]
+    return np.array(
+        [roll, state[STEER], aside, state[YAW_RATE], state[ROLL_RATE], state[STEER_RATE], state[FRONT], state[REAR]]
+    )

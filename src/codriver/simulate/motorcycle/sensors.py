@@ -2,6 +2,7 @@
 
     y = s + b + n,   n ~ N(0, sigma^2)          gyroscope, accelerometer; b a constant bias
     delta = q round(delta / q)                  encoder of 2 pi / q counts
+    v = c omega_f R_f                           wheel speed by the radius when upright: too high by some percent when leaning
 
 The accelerometer measures the specific force at its place in body axes: gravity, centripetal and lever-arm terms are all in it.
 Its axes are ISO 8855: forward, left, up.
@@ -31,7 +32,8 @@ class RideSensors:
         gyro_bias, accelerometer_bias: forward, left, up, rad/s and m/s^2.
         counts: of the steering encoder in a turn; 0 for an ideal one.
         speed_noise: sigma a sample, m/s.
-        speed_scale: of the measured to the true speed.
+        speed_scale: c, of the measured to the true speed.
+        wheel: whether the speed is the front wheel's, not that over ground.
     """
 
     gyro_noise: float = 0.005
@@ -41,15 +43,17 @@ class RideSensors:
     counts: int = 4096
     speed_noise: float = 0.05
     speed_scale: float = 1.0
+    wheel: bool = False
 
 
 IDEAL = RideSensors(gyro_noise=0.0, accelerometer_noise=0.0, counts=0, speed_noise=0.0)
 
 
 def relative_noise(ride: Ride, share: float) -> RideSensors:
-    """Noise in parts of each sensor's rms over the ride, as the paper states it; the largest of the three axes' for an IMU's.
+    """Noise whose sd is a part of each sensor's rms over the ride; the largest of the three axes' for an IMU's.
 
-    Gravity is taken from the accelerometer's vertical axis first.
+    Gravity is taken from the accelerometer's vertical axis first. The paper bounds its noise by 5 to 10 % of each signal's largest
+    value, which is about as much.
 
     Args:
         ride: the ride.
@@ -84,5 +88,6 @@ def sense(ride: Ride, sensors: RideSensors, seed: int = 0) -> dict[str, Array]:
         tick = 2 * pi / sensors.counts
         steer = tick * np.round(steer / tick)
     measured["steer_angle"] = steer
-    measured["speed"] = sensors.speed_scale * ride.speed + sensors.speed_noise * rng.standard_normal(count)
+    rolling = ride.of("front_spin_rate") * ride.rider.machine.parameters.sharp.Rf if sensors.wheel else ride.speed
+    measured["speed"] = sensors.speed_scale * rolling + sensors.speed_noise * rng.standard_normal(count)
     return measured
