@@ -70,6 +70,7 @@ _ENTRIES = (
         -7,
         7,
     ),
+    Quantity("pitching", "rad/s", "deg/s", "theta'", "pitch rate of a leaning machine beside that of its turn", -3, 3),
     Quantity("roll_rate", "rad/s", "deg/s", "p", "rotation about x, positive when the right side goes down", -7, 7),
     Quantity("pitch_rate", "rad/s", "deg/s", "q", "rotation about y, positive when the nose goes down", -7, 7),
     Quantity("roll_angle", "rad", "deg", "phi", "positive when leaning to the right", -pi / 2, pi / 2),

@@ -2,6 +2,7 @@
 
 from codriver.observers import intent as _intent  # noqa: F401, I001  registers its family, the first
 from codriver.observers import driver_torque_family as _driver_torque  # noqa: F401  registers its family
+from codriver.observers import motorcycle_family as _motorcycle  # noqa: F401  registers its family
 from codriver.observers.feed import best, feeds
 from codriver.observers.observer import Certificate, Observer, Output, chain
 from codriver.observers.preset_file import find_preset, preset_of, save_preset

@@ -19,6 +19,8 @@ import numpy.typing as npt
 
 from codriver.estimate import Estimate
 from codriver.observers import Output
+from codriver.report.motorcycle_panels import DRAWN as LEAN_DRAWN
+from codriver.report.motorcycle_panels import motorcycle_panels, of_a_motorcycle
 from codriver.report.parts import Band, Line, Panel
 from codriver.report.shown import shown, shown_unit, words
 from codriver.report.torque_panels import DRAWN, of_our_own, torque_panels
@@ -38,6 +40,7 @@ SPECIAL = (
 # Innovations: what a row is called in the legend, and its colour; the colours of other rows.
 ROWS = {"acceleration": ("accelerometer", ORANGE), "speed": ("speed", BLUE)}
 OTHERS = (BLUE, ORANGE, GREEN, RED, PURPLE, BLACK)
+MANY = 4  # rows whose legend leaves no place for a long title
 HELD = 0.5  # s over which an innovation is drawn on
 
 
@@ -48,9 +51,13 @@ def panels(estimate: Estimate, truth: Log | None = None) -> list[Panel]:
     torque = [] if not of_our_own(estimate) else torque_panels(
         estimate, _estimated(estimate, "driver_torque"), reference(("driver_torque", "true", "dot"))
     )  # fmt: skip
-    special = (*SPECIAL, *(DRAWN if torque else ()))
+    lean = [] if not of_a_motorcycle(estimate) else motorcycle_panels(
+        estimate, *(_compared(estimate, name, measured, reference) for name in ("roll_angle", "rider_torque", "steer_angle"))
+    )  # fmt: skip
+    special = (*SPECIAL, *(DRAWN if torque else ()), *(LEAN_DRAWN if lean else ()))
     made = [
         *torque,
+        *lean,
         *(_plain(output, estimate, measured, reference) for output in estimate.estimates if output.name not in special),
         _speed(estimate, measured, reference),
         _pedals(estimate, measured),
@@ -127,15 +134,21 @@ def _estimated(estimate: Estimate, name: str, shape: Callable[[Array], Array] | 
     return items
 
 
+def _compared(estimate: Estimate, name: str, measured: _Measured, truth: _Truth) -> tuple[Line | Band, ...]:
+    """An estimate beside what was measured and is true; nothing where it is not estimated."""
+    if name not in estimate:
+        return ()
+    items: list[Line | Band] = [Line("measured", measured(name), GREY, 1.0)] if name in measured else []
+    return (*items, *_estimated(estimate, name), *truth((name, "true", "dot")))
+
+
 def _plain(output: Output, estimate: Estimate, measured: _Measured, truth: _Truth) -> Panel:
     """An estimate that has no panel of its own kind."""
     name = output.name
-    items: list[Line | Band] = [Line("measured", measured(name), GREY, 1.0)] if name in measured else []
-    items += _estimated(estimate, name)
-    items += truth((name, "true", "dot"))
+    items = _compared(estimate, name, measured, truth)
     # Titles may hold markup, and a meaning is somebody's text.
     title = escape(words(name).capitalize() + (f": {output.meaning}" if output.meaning else ""))
-    return Panel(title, shown_unit(name, output.unit), 150, tuple(items), estimate.valid)
+    return Panel(title, shown_unit(name, output.unit), 150, items, estimate.valid)
 
 
 def _speed(estimate: Estimate, measured: _Measured, truth: _Truth) -> Panel | None:
@@ -244,7 +257,7 @@ def _innovations(estimate: Estimate) -> Panel | None:
         legend, color = ROWS.get(row.row, (words(row.row), OTHERS[number % len(OTHERS)]))
         carried_on = _carried_on(row.normalised(np.nan), round(HELD / estimate.grid.dt))
         items.append(Line(legend, np.where(estimate.valid, carried_on, np.nan), color, 0.9))
-    title = "Innovations: measured less predicted, in standard deviations (sd)"
+    title = "Innovations: measured less predicted, in standard deviations (sd)" if len(items) < MANY else "Innovations"
     return Panel(title, "sd", 110, tuple(items), estimate.valid, guides=(-SIGMAS, SIGMAS)) if items else None
 
 

@@ -1,0 +1,101 @@
+"""Rides of the nonlinear motorcycle for tests of its observers: simulated once a session, as logs with the IMU's names.
+
+Noise as the 2018 paper has it: 7.5 % of each sensor's rms at 1 kHz; biases of 0.5 deg/s and 0.2 m/s^2.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+import codriver as cd
+from codriver.models import MotorcycleParameters
+from codriver.names import quantity
+from codriver.simulate.motorcycle import (
+    Machine,
+    MachineParameters,
+    Ride,
+    Rider,
+    RideSensors,
+    double_lane_change,
+    ramp,
+    relative_noise,
+    ride,
+    sense,
+    slalom,
+)
+
+DEGREE, KMH = np.pi / 180, 1 / 3.6
+NAMES = {
+    "body_roll_rate": "roll_rate", "body_pitch_rate": "pitch_rate", "body_yaw_rate": "yaw_rate",
+    "force_y": "lateral_acceleration", "force_z": "vertical_acceleration", "steer_angle": "steer_angle",
+    "speed": "longitudinal_speed",
+}  # fmt: skip
+BIASES = {"gyro_bias": (0.5 * DEGREE,) * 3, "accelerometer_bias": (0.2,) * 3}
+TRUTH = {
+    "roll_angle": "roll", "rider_torque": "rider_torque", "front_lateral_force": "front_lateral_force",
+    "rear_lateral_force": "rear_lateral_force",
+}  # fmt: skip
+
+
+@cache
+def machine() -> Machine:
+    return Machine(MachineParameters(MotorcycleParameters.from_vehicle(cd.load_vehicle("sharp1971"))))
+
+
+@cache
+def vehicle() -> cd.Vehicle:
+    """Sharp's machine with the IMU where the simulated one has it."""
+    made = cd.load_vehicle("sharp1971")
+    for name, value in zip(("imu_forward", "imu_left", "imu_height"), machine().parameters.imu, strict=True):
+        made = made.with_parameter(name, value, source="the simulated machine")
+    return made
+
+
+def _steady(value: float):
+    return ramp(value, value, 0.0, 1.0)
+
+
+@cache
+def leaning_ride() -> Ride:
+    """4.5 s at 70 km/h: to 30 degrees to the right and over to the left."""
+    lean = lambda t: 0.55 * np.sin(2 * np.pi * max(t - 0.5, 0.0) / 5.0)  # noqa: E731
+    return ride(Rider(machine(), lambda _x: 0.0, _steady(70 * KMH), lean=lean), 4.5)
+
+
+@cache
+def lane_change_ride() -> Ride:
+    """At 100 km/h, 9 s."""
+    return ride(Rider(machine(), double_lane_change(3.5, 70.0, 40.0), _steady(100 * KMH)), 9.0)
+
+
+@cache
+def slalom_ride() -> Ride:
+    """From 50 to 100 km/h, 16 s."""
+    return ride(Rider(machine(), slalom(1.5, 100.0), ramp(50 * KMH, 100 * KMH, 2.0, 14.0)), 16.0)
+
+
+def noisy(done: Ride, **more: object) -> RideSensors:
+    """The paper's noise, and an encoder of 4096 counts."""
+    from dataclasses import replace
+
+    return replace(relative_noise(done, 0.075), **more)
+
+
+def ride_log(done: Ride, sensors: RideSensors, seed: int = 0, every: int = 1, start: int = 0) -> cd.Log:
+    measured = sense(done, sensors, seed)
+    t = done.time[start::every]
+    return cd.Log.of(
+        [cd.Signal(name, t, measured[key][start::every], quantity(name).unit) for key, name in NAMES.items()]
+    )
+
+
+def errors(estimate: cd.Estimate, done: Ride, name: str, after: float = 1.0) -> np.ndarray:
+    """Estimated less true, from so many seconds after the start on."""
+    true = np.interp(estimate.time, done.time, done.of(TRUTH[name]))
+    return (estimate[name].values - true)[estimate.time >= estimate.time[0] + after]
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
