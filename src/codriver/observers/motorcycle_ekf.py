@@ -63,7 +63,9 @@ STATES = (
 )  # fmt: skip
 N, MOVING, LEAN = len(STATES), 8, len(LEAN_STATES)
 ROLL, TURN, LEANING, MOMENT, PITCHING, BIASES = 0, 3, 4, 9, 10, 11
-PITCH_TIME, MOMENT_TIME = 0.2, 2.0  # s
+PITCH_TIME, MOMENT_TIME, TILT_TIME, HEAVE_TIME = 0.2, 0.5, 0.5, 0.2  # s
+RATE = 100.0  # Hz, at which the floors of the rows are told
+TILTED = {"roll_rate": TURN, "yaw_rate": LEANING}  # rows that see another rate where the machine is pitched
 TRACKING, SCATTER_TIME = 4.0, 2.0  # rad/s, s
 GAP, STALE = 1.0, 0.1  # s
 SLOW = (2.0, 4.0)  # m/s: all of it below the first, none above the second
@@ -85,8 +87,11 @@ class EkfNoise:
         torque: of the rider's torque's rate, N m/s per sqrt(Hz).
         moment, feet: sd of M_phi, N m, when riding and what is added when slow.
         pitch: sd of theta', rad/s.
+        tilt: sd of the pitch angle, rad, which turns p by W and r by phi' times itself, for `TILT_TIME` seconds.
         gyro_walk, accelerometer_walk: of the biases, rad/s and m/s^2 per sqrt(s).
-        gyro, lateral_force, vertical_force, encoder: floors of the rows' sd, rad/s, m/s^2, rad.
+        heave: error of the vertical acceleration of a lean, which springs take up, in parts of it, for `HEAVE_TIME` seconds.
+        gyro, lateral_force, vertical_force, encoder: floors of the rows' sd, rad/s, m/s^2, rad, for errors that are independent at
+            `RATE`.
     """
 
     lateral: float = 0.05
@@ -95,14 +100,16 @@ class EkfNoise:
     steer: float = 0.4
     tyre: float = 400.0
     torque: float = 25.0
-    moment: float = 8.0
+    moment: float = 20.0
     feet: float = 600.0
     pitch: float = 0.03
-    gyro_walk: float = 1e-4
+    gyro_walk: float = 0.0005
     accelerometer_walk: float = 1e-3
+    heave: float = 0.3
+    tilt: float = 0.012
     gyro: float = 0.003
-    lateral_force: float = 0.05
-    vertical_force: float = 0.3
+    lateral_force: float = 0.03
+    vertical_force: float = 0.22
     encoder: float = 0.0005
 
     def process(self) -> Array:
@@ -111,9 +118,10 @@ class EkfNoise:
         come_and_go = [self.moment * (2 / MOMENT_TIME) ** 0.5, self.pitch * (2 / PITCH_TIME) ** 0.5]
         return np.square([*white, *come_and_go, *[self.gyro_walk] * 3, *[self.accelerometer_walk] * 2])
 
-    def floors(self) -> dict[str, float]:
-        """Least sd of a sample, by row."""
-        return dict(zip(ROWS, [*[self.gyro] * 3, self.lateral_force, self.vertical_force, self.encoder], strict=True))
+    def floors(self, dt: float) -> dict[str, float]:
+        """Least variance of a tick's sample, by row."""
+        sds = [self.gyro] * 3 + [self.lateral_force, self.vertical_force, self.encoder]
+        return {row: sd * sd / (RATE * dt) for row, sd in zip(ROWS, sds, strict=True)}
 
 
 def motorcycle_ekf(
@@ -138,7 +146,7 @@ def motorcycle_ekf(
     rates, linear = lean_functions(p)
     show = _sensor_function(p)
     terms = _terms(linear, dt, high)
-    Q, floors = noise.process(), noise.floors()
+    Q, floors = noise.process(), noise.floors(dt)
 
     def step(carry: Scalars, u: Scalars, y: Scalars, ok: Scalars, rho: Scalars) -> tuple[Scalars, Scalars]:
         there: Scalar = 1.0
@@ -171,14 +179,19 @@ def motorcycle_ekf(
         # What the rows should show; the accelerations' derivatives are those at the last estimate.
         x = ca.vertcat(*found)
         S, C = ca.sin(x[0]), ca.cos(x[0])
-        expected, H = show(x, rates(x[:LEAN], v, dv, S, C)[2:5], A[2:5, :], v, S, C)
+        expected, H, heave = show(x, rates(x[:LEAN], v, dv, S, C)[2:5], A[2:5, :], v, S, C)
         done = Moments(found, covariance)
         out: Scalars = {}
         for k, row in enumerate(ROWS):
             fresh = both(ok[row], begun)  # the sample that it starts from is not taken twice
             value = expected[k] + sum(H[k, i] * (done.x[i] - found[i]) for i in range(N))
             e = select(fresh, y[row] - value, 0.0)
-            R = floors[row] ** 2 + (scatter[f"scatter_{row}"] if row in IMU else 0.0)
+            R = floors[row] + (scatter[f"scatter_{row}"] if row in IMU else 0.0)
+            if row in TILTED:
+                seen = noise.tilt * found[TILTED[row]]
+                R = R + seen * seen * (2 * TILT_TIME / dt)
+            if row == "vertical_acceleration":
+                R = R + (noise.heave * heave) ** 2 * (2 * HEAVE_TIME / dt)
             mean, covariance, s = update_row(done.x, done.P, [H[k, i] for i in range(N)], e, R, fresh)
             done = Moments(mean, covariance)
             out |= {f"{row}_innovation": e, f"{row}_innovation_sd": sqrt(s)}
@@ -245,7 +258,7 @@ def _sensor_function(p: LeanParameters) -> Scalar:
     H = ca.jacobian(rows, x)
     H[:, ROLL] += ca.jacobian(rows, S) * C - ca.jacobian(rows, C) * S
     H[:, :LEAN] += ca.jacobian(rows, a) @ bent
-    return ca.Function("show", [x, a, bent, v, S, C], [rows, H])
+    return ca.Function("show", [x, a, bent, v, S, C], [rows, H, up - g])
 
 
 def _terms(linear: Scalar, dt: float, high: float) -> int:
