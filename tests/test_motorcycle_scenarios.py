@@ -151,7 +151,7 @@ class TestBank:
         """Heading about the vertical, bank, roll and pitch from the truth, against the ideal gyroscope's integral."""
         course = by_curvature(lambda s: 0.012 * np.sin(s / 25), 400.0)
         rider = Rider(machine, course, steady(18.0), delay=0.15, feels_forces=False)
-        done = ride(rider, 4.0, bank=lambda s: 0.1 * rise(s / 30) * sin(s / 20))
+        done = ride(rider, 3.0, bank=lambda s: 0.1 * rise(s / 30) * sin(s / 20))
         rates = np.column_stack([done.of(f"body_{name}_rate") for name in ("roll", "pitch", "yaw")])
         attitude = Rotation.identity()
         for rate in (rates[1:] + rates[:-1]) / 2:
@@ -168,9 +168,12 @@ class TestBank:
 
 class TestRider:
     def test_from_rest_and_back(self, machine):
-        speed = lambda time, _s: min(3 * time, 12.0) if time < 6 else max(12.0 - 3 * (time - 6), 0.0)  # noqa: E731
-        rider = Rider(machine, double_lane_change(2.0, 25.0, 5.0, 8.0), speed, delay=0.15, feels_forces=False)
-        done = ride(rider, 12.0, every=10)
+
+        def speed(time: float, _distance: float) -> float:
+            return max(min(4 * time, 12.0, 4 * (8.0 - time)), 0.0)
+
+        rider = Rider(machine, double_lane_change(2.0, 20.0, 2.0, 6.0), speed, delay=0.15, feels_forces=False)
+        done = ride(rider, 9.0, every=10)
         assert done.speed[0] == 0
         assert done.speed.max() > 11.5
         assert done.speed[-1] < 0.1

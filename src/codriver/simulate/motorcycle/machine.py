@@ -58,11 +58,11 @@ class Machine:
 
     @cached_property
     def _rate(self) -> Callable[[Array, Array], Array]:
-        return _code(self.parameters, self.road, self.grip)[0].call()
+        return _code(self.parameters, self.road, self.grip, 0).call()
 
     @cached_property
     def _output(self) -> Callable[[Array, Array], Array]:
-        return _code(self.parameters, self.road, self.grip)[1].call()
+        return _code(self.parameters, self.road, self.grip, 1).call()
 
     @cached_property
     def _linear(self) -> ca.Function:
@@ -143,13 +143,13 @@ class Machine:
         return state
 
 
+@lru_cache(maxsize=16)
+def _code(parameters: MachineParameters, road: bool, grip: bool, which: int) -> Code:
+    """One of `_functions` as machine code: the same machine is compiled once."""
+    return compiled(_functions(parameters, road, grip)[which])
+
+
 @lru_cache(maxsize=8)
-def _code(parameters: MachineParameters, road: bool, grip: bool) -> tuple[Code, Code]:
-    """`_functions` as machine code: the same machine is compiled once."""
-    rate, output = _functions(parameters, road, grip)
-    return compiled(rate), compiled(output)
-
-
 def _functions(parameters: MachineParameters, road: bool, grip: bool) -> tuple[ca.Function, ca.Function]:
     """Rates of the states, and `OUTPUTS`. Worked out in the heading's axes: the yaw angle is 0 there."""
     x, inputs = ca.SX.sym("x", len(STATES)), ca.SX.sym("inputs", len(INPUTS))
