@@ -1,0 +1,78 @@
+"""All observers on all rides through ideal sensors, noisy ones, and noisy ones with biases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from codriver.papers.motorcycle2018.methods import METHODS, program
+from codriver.papers.motorcycle2018.rides import JUDGED, NOISE, WORDS, Errors, Scene, judged, sizes
+from codriver.papers.reproduction import Tell
+from codriver.report.document import Table
+
+COUNTS = 4096
+# By name: the sensors of `Scene.log`.
+SENSORS: dict[str, dict[str, float]] = {
+    "ideal": {}, "noise": {"noise": NOISE, "counts": COUNTS}, "bias": {"noise": NOISE, "counts": COUNTS, "bias": 1.0},
+}  # fmt: skip
+SAID = {"ideal": "ideal", "noise": "noisy", "bias": "noisy, biased"}
+QUANTITY = {
+    "roll_angle": "Roll angle", "rider_torque": "Rider's torque", "front_lateral_force": "Front tyre's lateral force",
+    "rear_lateral_force": "Rear tyre's lateral force", "lateral_velocity": "Lateral velocity",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """What all observers err by.
+
+    Attributes:
+        errors: by method, ride and sensors.
+        zero: of answering zero, by ride.
+    """
+
+    errors: Mapping[tuple[str, str, str], Errors]
+    zero: Mapping[str, Errors]
+
+    def roll(self, method: str, ride: str, sensors: str) -> float:
+        """RMSE of the roll angle, degrees."""
+        return self.errors[method, ride, sensors]["roll_angle"]
+
+    def best(self, ride: str, sensors: str, name: str = "roll_angle") -> str:
+        """The method that errs least."""
+        return min(
+            (m for m in METHODS if self.errors[m, ride, sensors][name] == self.errors[m, ride, sensors][name]),
+            key=lambda m: self.errors[m, ride, sensors][name],
+        )
+
+    def table(self, name: str) -> Table:
+        """RMSE of a quantity, a row an observer.
+
+        Args:
+            name: of JUDGED.
+        """
+        columns = [(ride, kind) for ride in self.zero for kind in SENSORS]
+        rows = [
+            (METHODS[m].label, *(None if (e := self.errors[m, *c][name]) != e else e for c in columns)) for m in METHODS
+        ]
+        size = ("answering zero", *(self.zero[ride][name] for ride, _ in columns))
+        head = ("observer", *(f"{WORDS[ride]}, {SAID[kind]}" for ride, kind in columns))
+        return Table(head, (*rows, size), f"{QUANTITY[name]}: RMSE, {JUDGED[name][0]}.")
+
+
+def compare(rides: Iterable[Scene], seeds: int, tell: Tell) -> Compared:
+    """Judge.
+
+    Args:
+        rides: one a scenario.
+        seeds: readings of noisy sensors.
+        tell: is told each method.
+    """
+    rides, found = list(rides), {}
+    for method in METHODS:
+        tell(f"estimating: {METHODS[method].label}")
+        made = program(method)
+        for ride in rides:
+            for kind, sensors in SENSORS.items():
+                found[method, ride.name, kind] = judged(made, ride, seeds if sensors else 1, **sensors)
+    return Compared(found, {ride.name: sizes(ride) for ride in rides})

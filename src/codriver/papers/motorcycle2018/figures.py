@@ -1,0 +1,211 @@
+"""2018 figures 2 to 11: each ride's path and speed, what is measured, and what the observers make of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from codriver.observers.butterworth import butterworth_filter
+from codriver.observers.motorcycle_ts import motorcycle_ts_observer
+from codriver.observers.observer import chain
+from codriver.papers.item import Item
+from codriver.papers.motorcycle2018.compare import SENSORS
+from codriver.papers.motorcycle2018.methods import METHODS, behind, compiled, lmi, program
+from codriver.papers.motorcycle2018.rides import DT, JUDGED, WORDS, Errors, Scene, errors
+from codriver.papers.reproduction import Chapter
+from codriver.report.document import BLACK, GREY, Chart, Curve, Plot
+from codriver.signals.signal import Array
+
+FEW = {"track": 10, "slalom": 4, "double-lane-change": 2}  # ticks from point to point
+SHOWN = ("paper", "ts", "ekf")
+LABELS = {
+    "front_lateral_force": "front force (N)", "rear_lateral_force": "rear force (N)", "roll_angle": "roll (deg)",
+    "rider_torque": "torque (N m)",
+}  # fmt: skip
+DEGREE = 180 / np.pi
+CUTOFF = 5.0  # Hz
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a ride stands in the paper.
+
+    Attributes:
+        section: of the paper.
+        path, measured, estimated: figures.
+        sensors: of `compare.SENSORS`, as the paper has them.
+    """
+
+    section: str
+    path: int
+    measured: int
+    estimated: int
+    sensors: str
+
+
+PLACES = {
+    "track": Place("V.A", 2, 3, 4, "ideal"), "slalom": Place("V.B", 5, 6, 7, "ideal"),
+    "double-lane-change": Place("V.C", 8, 9, 10, "noise"),
+}  # fmt: skip
+
+
+def figure_chapters(rides: Sequence[Scene]) -> list[Chapter]:
+    """A chapter a ride.
+
+    Args:
+        rides: one a scenario.
+    """
+    return [_chapter(ride) for ride in rides]
+
+
+def _chapter(ride: Scene) -> Chapter:
+    place, name = PLACES[ride.name], WORDS[ride.name]
+    ideal = place.sensors == "ideal"
+    words = (
+        f"As in the paper, the sensors are {'ideal' if ideal else 'noisy'} here. Signs are ISO 8855: roll is positive to the right, "
+        "all else to the left.",
+    )
+    charts = [_path(ride, place), *_measured(ride, place), _estimated(ride, place)]
+    items = [_perfectly(ride, place)]
+    if ride.name == "double-lane-change":
+        charts.append(_filtered(ride))
+    steer = DEGREE * float(np.abs(ride.truth["steer_angle"].values).max())
+    if ride.name == "slalom":
+        items += _slalom(ride)
+    said = {
+        "track": (2.0, "up to 2 deg"),
+        "slalom": (2.0, "up to 2 deg"),
+        "double-lane-change": (0.5, "-0.5 to 0.5 deg"),
+    }[ride.name]
+    items.append(Item(
+        f"V.C: steer angle, {name}", said[1], steer, "deg", 0.5 * said[0] <= steer <= 2 * said[0],
+        "the largest; on a course of our own, so half to twice counts",
+    ))  # fmt: skip
+    return Chapter(f"{name.capitalize()}: figures {place.path} to {place.estimated + (ride.name == 'double-lane-change')} "
+                   f"({place.section})", words, tuple(charts), tuple(items))  # fmt: skip
+
+
+def _path(ride: Scene, place: Place) -> Chart:
+    few, d = slice(None, None, FEW[ride.name]), ride.record.ride
+    x, y = d.of("x")[few], d.of("y")[few]
+    speed = 3.6 * d.speed[few]
+    if ride.name == "track":
+        return Chart(f"Figure {place.path}, left: the path", "x (m)", (Plot("y (m)", (Curve("", x, y, BLACK),), 380),),
+                     f"Speed {speed.min():.0f} to {speed.max():.0f} km/h.")  # fmt: skip
+    return Chart(
+        f"Figure {place.path}: path and speed", "x (m)",
+        (Plot("y (m)", (Curve("", x, y, BLACK),), 180), Plot("speed (km/h)", (Curve("", x, speed, BLACK),), 150)),
+    )  # fmt: skip
+
+
+def _measured(ride: Scene, place: Place) -> list[Chart]:
+    log, few = ride.log(1, **SENSORS[place.sensors]), slice(None, None, FEW[ride.name])
+    plots = [
+        Plot(label, (Curve("", log[name].time[few], factor * log[name].values[few], BLACK),), 130)
+        for name, label, factor in (
+            ("steer_angle", "steer (deg)", DEGREE), ("yaw_rate", "body yaw rate (deg/s)", DEGREE),
+            ("roll_rate", "roll rate (deg/s)", DEGREE), ("lateral_acceleration", "f_y, body (m/s²)", 1.0),
+            ("longitudinal_speed", "speed (km/h)", 3.6),
+        )
+    ]  # fmt: skip
+    return [Chart(f"Figure {place.measured}: what the sensors show", "time (s)", tuple(plots),
+                  "The lateral acceleration in the body's frame is near 0 in a turn: gravity and turn cancel.")]  # fmt: skip
+
+
+def _estimated(ride: Scene, place: Place) -> Chart:
+    log = ride.log(1, **SENSORS[place.sensors])
+    found = {name: program(name).run(log) for name in SHOWN}
+    few = slice(None, None, FEW[ride.name])
+    plots = []
+    for name, label in LABELS.items():
+        factor = JUDGED[name][1]
+        curves = [
+            Curve(METHODS[m].short, e.time[few], factor * e.columns[name][few], METHODS[m].color, width=1.2)
+            for m, e in found.items()
+        ]
+        time = found["ts"].time[few]
+        true = factor * ride.of(name, time)
+        curves.append(Curve("true", time, true, BLACK, dash="dot"))
+        plots.append(Plot(label, tuple(curves), 210, limits=_limits(true)))
+    return Chart(
+        f"Figure {place.estimated}: estimated and true",
+        "time (s)",
+        tuple(plots),
+        "LMI, (17): the observer as the paper has it; it leaves the picture where it must. LMI, a = v W: the same gains.",
+    )
+
+
+def _limits(true: Array) -> tuple[float, float]:
+    """Half as much again as the truth."""
+    low, high = float(true.min()), float(true.max())
+    return low - 0.5 * (high - low), high + 0.5 * (high - low)
+
+
+def _filtered(ride: Scene) -> Chart:
+    log = ride.log(1, **SENSORS["noise"])
+    names = ("rider_torque", "front_lateral_force")
+    raw, smooth = (
+        program("ts").run(log),
+        compiled(chain(behind(motorcycle_ts_observer(lmi())), butterworth_filter(DT, names, CUTOFF))).run(log),
+    )
+    few = slice(None, None, FEW[ride.name])
+    plots = tuple(
+        Plot(LABELS[name], (
+            Curve("raw", raw.time[few], raw.columns[name][few], GREY, width=1.0),
+            Curve(f"third order, {CUTOFF:g} Hz", smooth.time[few], smooth.columns[name][few], "#C84C00"),
+            Curve("true", raw.time[few], ride.of(name, raw.time[few]), BLACK, dash="dot"),
+        ), 210)
+        for name in names
+    )  # fmt: skip
+    return Chart(
+        "Figure 11: torque and front force behind a Butterworth filter", "time (s)", plots, "LMI with a = v W."
+    )
+
+
+def _perfectly(ride: Scene, place: Place) -> Item:
+    """Errors over what is estimated, figures 4, 7, 10."""
+    log = ride.log(1, **SENSORS[place.sensors])
+
+    def shares(method: str) -> dict[str, float]:
+        late = errors(program(method).run(log), ride)
+        size = _rms(ride)
+        return {name: late[name] / size[name] for name in LABELS}
+
+    paper, turn, ekf = (shares(m) for m in SHOWN)
+
+    def told(found: dict[str, float]) -> str:
+        return ", ".join(f"{LABELS[n].split(' (')[0]} {x:.0%}" for n, x in found.items())
+
+    return Item(
+        f"fig. {place.estimated}: states and rider's torque are followed, {WORDS[ride.name]}",
+        "perfectly estimated",
+        told(paper),
+        "",
+        max(paper.values()) <= 0.2,
+        f"RMSE over rms, as the paper has the observer; a fifth of each counts. With a = v W: {told(turn)}; EKF: {told(ekf)}",
+    )
+
+
+def _rms(ride: Scene) -> Errors:
+    from codriver.papers.motorcycle2018.rides import sizes
+
+    return sizes(ride)
+
+
+def _slalom(ride: Scene) -> list[Item]:
+    """V.B: whether the speed matters."""
+    estimate = program("ts").run(ride.log(1))
+    off = np.abs(estimate.columns["roll_angle"] - ride.of("roll_angle", estimate.time)) * DEGREE
+    lean = ride.of("roll_angle", estimate.time) * DEGREE
+    speed = 3.6 * ride.of("longitudinal_speed", estimate.time)
+    late = estimate.time >= 3.0
+    middle = float(np.median(speed[late]))
+    parts = [late & (speed < middle), late & (speed >= middle)]
+    share = [float(np.sqrt(np.mean(off[p] ** 2)) / np.sqrt(np.mean(lean[p] ** 2))) for p in parts]
+    return [Item(
+        "V.B: the estimate does not depend on the speed", "independently", f"{share[0]:.3f} below, {share[1]:.3f} above {middle:.0f} km/h",
+        "", 0.5 <= share[0] / share[1] <= 2.0,
+        "RMSE of the roll over its rms, LMI with a = v W, ideal sensors; within a factor of two counts",
+    )]  # fmt: skip
