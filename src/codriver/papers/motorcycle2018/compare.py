@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
+from codriver.estimate import Estimate
 from codriver.papers.motorcycle2018.methods import METHODS, program
 from codriver.papers.motorcycle2018.rides import JUDGED, NOISE, WORDS, Errors, Scene, judged, sizes
 from codriver.papers.reproduction import Tell
@@ -39,9 +42,9 @@ class Compared:
         return self.errors[method, ride, sensors]["roll_angle"]
 
     def best(self, ride: str, sensors: str, name: str = "roll_angle") -> str:
-        """The method that errs least."""
+        """The method that errs least, of those that have sensors."""
         return min(
-            (m for m in METHODS if self.errors[m, ride, sensors][name] == self.errors[m, ride, sensors][name]),
+            (m for m in METHODS if not METHODS[m].fed and np.isfinite(self.errors[m, ride, sensors][name])),
             key=lambda m: self.errors[m, ride, sensors][name],
         )
 
@@ -71,8 +74,28 @@ def compare(rides: Iterable[Scene], seeds: int, tell: Tell) -> Compared:
     rides, found = list(rides), {}
     for method in METHODS:
         tell(f"estimating: {METHODS[method].label}")
-        made = program(method)
         for ride in rides:
-            for kind, sensors in SENSORS.items():
-                found[method, ride.name, kind] = judged(made, ride, seeds if sensors else 1, **sensors)
+            for kind in SENSORS:
+                found[method, ride.name, kind] = _one(method, ride, kind, seeds)
     return Compared(found, {ride.name: sizes(ride) for ride in rides})
+
+
+def _one(method: str, ride: Scene, kind: str, seeds: int) -> Errors:
+    """Of one method on one ride; NaN where it takes no sensors, and these are biased."""
+    fed, sensors = METHODS[method].fed, SENSORS[kind]
+    if fed and "bias" in sensors:
+        return dict.fromkeys(JUDGED, float("nan"))
+    return judged(program(method), ride, seeds if sensors else 1, fed=fed, **sensors)
+
+
+def estimate(method: str, ride: Scene, kind: str = "ideal") -> Estimate:
+    """One method on a ride, first reading of its sensors.
+
+    Args:
+        method: of METHODS.
+        ride: the ride.
+        kind: of SENSORS.
+    """
+    sensors = SENSORS[kind]
+    log = ride.measures(1, sensors.get("noise", 0.0)) if METHODS[method].fed else ride.log(1, **sensors)
+    return program(method).run(log)

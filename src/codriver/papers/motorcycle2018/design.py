@@ -59,8 +59,10 @@ def design_chapter(rides: Sequence[Scene], quick: bool) -> Chapter:
     items = (_gamma(), _supremum(main), _region(tried), _goal(main, calm, ride), _scheduling(main, constant, ride),
              _euler(main), _real_time(ride))  # fmt: skip
     words = (
-        "gamma weighs errors of unlike units against noise and torque rate, and means nothing without them. Here an error of 1 deg of "
-        "roll, 0.1 deg of steer, 0.05 m/s, 2 deg/s, 100 N, 5 N m each counts 1; the torque's rate is 80 N m/s, D the sensors' sd by "
+        "gamma weighs errors of unlike units against noise and torque rate, and means nothing without them. Here an error of 1 "
+        "deg of "
+        "roll, 0.1 deg of steer, 0.05 m/s, 2 deg/s, 100 N, 5 N m each counts 1; the torque's rate is 80 N m/s, D the sensors' "
+        "sd by "
         "the root of their rate. The certificate below is computed from gains and Lyapunov matrix by plain eigenvalues.",
     )
     claims = Findings(tuple(("ok", claim) for claim in main.certificate.claims))
@@ -126,9 +128,8 @@ def _region(tried: Sequence[Tried]) -> Item:
     free = tried[0]
     fast = float(np.abs(free.design.certificate.eigenvalues).max()) if free.design else float("nan")
     return Item(
-        "V: gamma as the parameter of optimisation", "an adjustable parameter", f"the least gamma has poles up to {fast:.2g} rad/s", "",
-        fast < 2 * np.pi * RATE, f"with no region for the poles; below 2 pi times the sensors' {RATE} Hz counts. The paper has no "
-        "region, and its gains are not printed",
+        "the observer of the least gamma can be run", None, f"poles up to {fast:.2g} rad/s", "", fast < 2 * np.pi * RATE,
+        f"not in the paper, which makes gamma small and has no region for the poles; below 2 pi times the sensors' {RATE} Hz counts",
     )  # fmt: skip
 
 
@@ -138,7 +139,8 @@ def _goal(main: MotorcycleLMI, calm: MotorcycleLMI, ride: Scene) -> Item:
         "a smaller gamma is a better observer", None,
         f"gamma {main.gamma:.3f}: {a['roll_angle']:.2f} deg; {calm.gamma:.3f}: {b['roll_angle']:.2f} deg", "",
         a["roll_angle"] < b["roll_angle"],
-        "not in the paper, which takes it so; roll with noise. What errs here is no white noise: a = v W and the linear model err as "
+        "not in the paper, which takes it so; roll with noise. What errs here is no white noise: a = v W and the linear model "
+        "err as "
         "slowly as the machine leans",
     )  # fmt: skip
 
@@ -162,7 +164,8 @@ def _euler(design: MotorcycleLMI) -> Item:
     return Item(
         "forward Euler will do at the sensors' rate", None, ", ".join(f"{1 / dt:.0f} Hz {x:.2f}" for dt, x in worst.items()), "",
         max(worst.values()) < 1,
-        "not in the paper; greatest |1 + dt s| of the observer's poles, below 1 is stable. The observer here sums the Taylor series "
+        "not in the paper; greatest |1 + dt s| of the observer's poles, below 1 is stable. The observer here sums the Taylor "
+        "series "
         "of its own matrix instead",
     )  # fmt: skip
 

@@ -36,7 +36,8 @@ class Framed:
         turn_a, turn_W: by a = v W.
         radicand: of (17).
         same: share of turning ticks in which f_y has the sign of a.
-        off: RMS of a by (17) and by a = v W, of W by (19) and by the turn, of phi' by (20), of phi by (18).
+        off: RMS of a by (17), by (17) with the yaw rate's sign, and by a = v W; of W by (19) and by the turn; of phi' by (20),
+            of phi by (18).
     """
 
     time: Array
@@ -73,7 +74,8 @@ def framed(ride: Scene, **sensors: float) -> Framed:
     lean = np.arctan2(q * np.sign(r), np.abs(r))
     turning = np.abs(a) > TURNING
     off = {
-        "a squares": squares_a - a, "a turn": turn_a - a, "W squares": squares_W - W, "W turn": turn_W - W,
+        "a signed": np.sign(r) * np.abs(squares_a) - a, "a squares": squares_a - a, "a turn": turn_a - a,
+        "W squares": squares_W - W, "W turn": turn_W - W,
         "rate": p - rate, "lean": (lean - phi)[turning] / DEGREE, "a": a, "W": W,
     }  # fmt: skip
     return Framed(
@@ -99,14 +101,16 @@ def frames_chapter(rides: Sequence[Scene]) -> Chapter:
     items = (
         Item("IV.A: both lateral accelerations systematically have the same sign", "systematically", _listed(same, ".0%"), "",
              min(same.values()) >= 0.95,
-             f"share of ticks with more than {TURNING:g} m/s² along the road, ideal sensors; 95 % counts. In a balanced turn gravity "
+             f"share of ticks with more than {TURNING:g} m/s² along the road, ideal sensors; 95 % counts. In a balanced turn "
+             f"gravity "
              "and turn cancel along the body's y, and wide tyres let gravity win: the sign is then the wrong one"),
         Item("(17): the lateral acceleration by squares", "considered as measured",
              _listed({n: f.off["a squares"] for n, f in ideal.items()}, ".2f") + " m/s²", "",
              max(f.off["a squares"] / f.off["a"] for f in ideal.values()) <= 0.2,
              "RMS error, ideal sensors; a fifth of the acceleration's rms counts, which is "
              f"{_listed({n: f.off['a'] for n, f in ideal.items()}, '.2f')}. a = v W errs by "
-             f"{_listed({n: f.off['a turn'] for n, f in ideal.items()}, '.2f')}"),
+             f"{_listed({n: f.off['a turn'] for n, f in ideal.items()}, '.2f')}, (17) with the yaw rate's sign by "
+             f"{_listed({n: f.off['a signed'] for n, f in ideal.items()}, '.2f')}"),
         Item("(17): the root's argument is never negative", "not asked", _listed(negative, ".0%"), "", max(negative.values()) == 0,
              "share of ticks with f_y² + f_z² < g², ideal sensors: heave and pitch, which (16) leaves out, and a falling or rising "
              "body"),
@@ -118,7 +122,8 @@ def frames_chapter(rides: Sequence[Scene]) -> Chapter:
         Item("(20): the roll rate is the gyroscope's", "trivial", rate, "rad/s", rate <= 0.02,
              "greatest RMS error of the rides, ideal sensors; 0.02 counts"),
         Item("(18) with no pitch rate gives the roll at once", None, lean, "deg", lean <= 2.0,
-             "not in the paper, though it follows: phi = atan2(q, r). Greatest RMS error, where it turns, ideal sensors; 2 deg counts. "
+             "not in the paper, though it follows: phi = atan2(q, r). Greatest RMS error, where it turns, ideal sensors; 2 deg "
+             "counts. "
              f"With noise {max(f.off['lean'] for f in noisy.values()):.1f}"),
         Item("a = v W is nearer than (17)", None, _listed(worse, ".1f"), "", min(worse.values()) > 1,
              "not in the paper; RMS error of (17) over that of a = v W, ideal sensors"),
@@ -128,7 +133,8 @@ def frames_chapter(rides: Sequence[Scene]) -> Chapter:
         "that here: in a balanced turn a = v W and sin phi = -v r / g, without root and sign.",
     )
     return Chapter(
-        "From the body's frame to the road's (16)-(20)", words, (*(_chart(r, ideal[r.name]) for r in rides[:1]), _table(ideal, noisy)),
+        "From the body's frame to the road's "
+        "(16)-(20)", words, (*(_chart(r, ideal[r.name]) for r in rides[:1]), _table(ideal, noisy)),
         items,
     )  # fmt: skip
 
@@ -139,11 +145,13 @@ def _listed(values: dict[str, float], form: str) -> str:
 
 def _table(ideal: dict[str, Framed], noisy: dict[str, Framed]) -> Table:
     rows = tuple(
-        (WORDS[name], kind, f.off["a"], f.off["a squares"], f.off["a turn"], f.off["W"], f.off["W squares"], f.off["W turn"],
+        (WORDS[name], kind, f.off["a"], f.off["a squares"], f.off["a signed"], f.off["a turn"], f.off["W"],
+         f.off["W squares"], f.off["W turn"],
          f.off["lean"])
         for kind, found in (("ideal", ideal), ("noisy", noisy)) for name, f in found.items()
     )  # fmt: skip
-    head = ("ride", "sensors", "a, rms, m/s²", "error by (17)", "by a = v W", "W, rms, rad/s", "error by (19)",
+    head = ("ride", "sensors", "a, rms, m/s²", "error by (17)", "with the sign of r", "by a = v W", "W, rms, rad/s", "error by "
+    "(19)",
             "by the turn", "roll by atan2(q, r), deg")  # fmt: skip
     return Table(head, rows, "RMS over the ride.")
 

@@ -92,17 +92,21 @@ class Method:
         short: where there is little room.
         color: of its curves.
         make: it.
+        fed: it is given the measurements of (21) themselves, `Scene.measures`, and no sensors.
     """
 
     label: str
     short: str
     color: str
     make: Callable[[], Observer]
+    fed: bool = False
 
 
 METHODS: dict[str, Method] = {
     "paper": Method("LMI observer, acceleration by (17), yaw rate by (19): the paper's", "LMI, (17)", "#C84C00",
                     lambda: behind(motorcycle_ts_observer(lmi()), "squares")),
+    "fed": Method("LMI observer, given the measurements of (21) themselves", "LMI, fed", "#B0479B",
+                  lambda: motorcycle_ts_observer(lmi()), fed=True),
     "ts": Method("LMI observer, a = v W", "LMI, a = v W", "#0072B2", lambda: behind(motorcycle_ts_observer(lmi()))),
     "constant": Method("LMI observer, a = v W, one gain at all speeds", "LMI, one gain", "#8E2F86",
                        lambda: behind(motorcycle_ts_observer(lmi(scheduled=False)))),

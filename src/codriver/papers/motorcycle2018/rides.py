@@ -12,8 +12,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from codriver.estimate import Estimate
+from codriver.names import quantity
 from codriver.program import Program
-from codriver.signals import Log
+from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
 from codriver.simulate.motorcycle import RideRecord, RideSetting, sense, simulate_ride
 from codriver.simulate.motorcycle.scenarios import sensors_of
@@ -64,6 +65,28 @@ class Scene:
             self._logs[key] = RideRecord(setting, seed, done, measured).log()
         return self._logs[key]
 
+    def measures(self, seed: int = 1, noise: float = 0.0) -> Log:
+        """The measurements of (21) themselves, along the road, as if sensors showed them.
+
+        Args:
+            seed: of the noise.
+            noise: white, on each, uniform within this part of its largest value, as the paper has it; none on the speed.
+        """
+        rng, t = np.random.default_rng([seed, 21]), self.truth
+        mass = self.record.ride.rider.machine.parameters.sharp.mass
+        force = t["front_lateral_force"].values + t["rear_lateral_force"].values
+        columns = {
+            "steer_angle": t["steer_angle"].values, "yaw_rate": t["heading_rate"].values, "roll_rate": t["roll_rate"].values,
+            "steer_rate": t["steer_rate"].values, "lateral_acceleration": force / mass,
+        }  # fmt: skip
+        time = t["roll_angle"].time
+        made = [
+            Signal(n, time, x + noise * np.abs(x).max() * rng.uniform(-1, 1, x.size), quantity(n).unit)
+            for n, x in columns.items()
+        ]
+        speed = "longitudinal_speed"
+        return Log.of([*made, Signal(speed, time, t[speed].values, "m/s")], source="measurements of (21)")
+
     def of(self, name: str, time: Array) -> Array:
         """The truth at some times."""
         return np.interp(time, self.truth[name].time, self.truth[name].values)
@@ -111,14 +134,18 @@ def sizes(ride: Scene, after: float = SETTLE) -> Errors:
     }
 
 
-def judged(program: Program, ride: Scene, seeds: int, **sensors: float) -> Errors:
+def judged(program: Program, ride: Scene, seeds: int, *, fed: bool = False, **sensors: float) -> Errors:
     """Errors over several readings of the sensors, RMS over all.
 
     Args:
         program: the observer.
         ride: to judge on.
         seeds: how many readings.
-        sensors: see `Scene.log`.
+        fed: it takes the measurements of (21), `Scene.measures`.
+        sensors: see `Scene.log`; of `Scene.measures` the noise alone.
     """
-    each = [errors(program.run(ride.log(seed, **sensors)), ride) for seed in range(1, seeds + 1)]
+    each = []
+    for seed in range(1, seeds + 1):
+        log = ride.measures(seed, sensors.get("noise", 0.0)) if fed else ride.log(seed, **sensors)
+        each.append(errors(program.run(log), ride))
     return {name: float(np.sqrt(np.mean([e[name] ** 2 for e in each]))) for name in JUDGED}

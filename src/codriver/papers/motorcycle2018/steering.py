@@ -33,18 +33,23 @@ def steering_chapter(rides: Sequence[Scene]) -> Chapter:
     best = {c: min(WINDOWS, key=lambda w: behind_it[w, c]) for c in COUNTS}
     quick, calm = behind_it[WINDOWS[0], 1024], behind_it[best[1024], 1024]
     items = (
-        Item("IV.A: the steering rate by numerical differentiation [30]", "efficient", f"{min(rate[w, 4096] for w in WINDOWS) / size:.0%} of its "
+        Item("IV.A: the steering rate by numerical differentiation "
+        "[30]", "efficient", f"{min(rate[w, 4096] for w in WINDOWS) / size:.0%} of its "
              "rms at best", "", min(rate[w, 4096] for w in WINDOWS) <= 0.2 * size,
-             f"RMSE of the algebraic differentiator, best of the windows, encoder of 4096 counts, {WORDS[ride.name]}; a fifth counts. With an ideal "
+             f"RMSE of the algebraic differentiator, best of the windows, encoder of 4096 counts, {WORDS[ride.name]}; a fifth "
+             f"counts. With an ideal "
              f"encoder {min(rate[w, 0] for w in WINDOWS) / size:.0%}"),
         Item("a slope over one tick will do", None, f"{quick:.1f} against {calm:.1f} N m", "", quick <= 1.1 * calm,
-             f"not in the paper; torque with an encoder of 1024 counts, window of 5 ms against {1e3 * best[1024]:.0f} ms; 10 % more "
+             f"not in the paper; torque with an encoder of 1024 counts, window of 5 ms against {1e3 * best[1024]:.0f} ms; 10 % "
+             f"more "
              "counts"),
     )  # fmt: skip
     return Chapter(
         "The steering rate from the encoder (IV.A)",
-        ("The paper names neither window nor encoder. A short window hands the encoder's counts on, a long one is late by half of it.",),
-        (_table(rate, "Steering rate: RMSE, rad/s"), _table(behind_it, "Rider's torque behind it: RMSE, N m, LMI with a = v W, noisy sensors")),
+        ("The paper names neither window nor encoder. A short window hands the encoder's counts on, a long one is late by half "
+        "of it.",),
+        (_table(rate, "Steering rate: RMSE, rad/s"), _table(behind_it, "Rider's torque behind it: RMSE, N m, LMI with a = v W, "
+        "noisy sensors")),
         items,
     )  # fmt: skip
 
