@@ -15,7 +15,7 @@ from codriver.papers.motorcycle2018.compare import Compared
 from codriver.papers.motorcycle2018.methods import METHODS, compiled, lmi, program
 from codriver.papers.motorcycle2018.rides import DT, JUDGED, NOISE, SETTLE, WORDS, Scene, errors, sizes
 from codriver.papers.reproduction import Chapter
-from codriver.report.document import BLACK, Chart, Curve, Plot, Table
+from codriver.report.document import BLACK, Chart, Curve, Mark, Plot, Table
 from codriver.signals.grid import Flags
 
 LEVELS = (0.05, 0.075, 0.1)
@@ -180,20 +180,22 @@ def _sideways(found: Compared, rides: Sequence[Scene]) -> Item:
 
 def _levels_table(levels: dict[float, dict[str, float]], ride: Scene) -> Table:
     names = [name for name in JUDGED if name != "lateral_velocity"]
-    rows = tuple((f"{level:.1%}", *(found[n] for n in names)) for level, found in levels.items())
+    rows: list[tuple[str | float | Mark | None, ...]] = [
+        (f"{level:.1%}", *(found[n] for n in names)) for level, found in levels.items()
+    ]
     return Table(
-        ("noise", *(n.replace("_", " ") for n in names)), rows,
+        ("noise", *(n.replace("_", " ") for n in names)), tuple(rows),
         f"What noise on each measurement of (21) does to the LMI observer's outputs: RMS over each one's rms, {WORDS[ride.name]}.",
     )  # fmt: skip
 
 
 def _cutoff_table(filtered: dict[float, dict[str, tuple[float, float]]], ride: Scene) -> Table:
-    rows = tuple(
+    rows: list[tuple[str | float | Mark | None, ...]] = [
         (f"{c:g} Hz" if c else "no filter", 1e3 * late_by(c) if c else 0.0, *(x for n in FILTERED for x in found[n]))
         for c, found in filtered.items()
-    )
+    ]
     head = ("cut-off", "late, ms", "torque: error, N m", "of noise", "front force: error, N", "of noise")
     return Table(
-        head, rows,
+        head, tuple(rows),
         f"Behind a Butterworth filter of third order; {WORDS[ride.name]}, LMI observer given measurements with 7.5 % noise.",
     )  # fmt: skip

@@ -11,7 +11,7 @@ from codriver.estimate import Estimate
 from codriver.papers.motorcycle2018.methods import METHODS, program
 from codriver.papers.motorcycle2018.rides import JUDGED, NOISE, WORDS, Errors, Scene, judged, sizes
 from codriver.papers.reproduction import Tell
-from codriver.report.document import Table
+from codriver.report.document import Mark, Table
 
 COUNTS = 4096
 # By name: the sensors of `Scene.log`.
@@ -55,10 +55,13 @@ class Compared:
             name: of JUDGED.
         """
         columns = [(ride, kind) for ride in self.zero for kind in SENSORS]
-        rows = [
+        rows: list[tuple[str | float | Mark | None, ...]] = [
             (METHODS[m].label, *(None if (e := self.errors[m, *c][name]) != e else e for c in columns)) for m in METHODS
         ]
-        size = ("answering zero", *(self.zero[ride][name] for ride, _ in columns))
+        size: tuple[str | float | Mark | None, ...] = (
+            "answering zero",
+            *(self.zero[ride][name] for ride, _ in columns),
+        )
         head = ("observer", *(f"{WORDS[ride]}, {SAID[kind]}" for ride, kind in columns))
         return Table(head, (*rows, size), f"{QUANTITY[name]}: RMSE, {JUDGED[name][0]}.")
 
@@ -85,7 +88,7 @@ def _one(method: str, ride: Scene, kind: str, seeds: int) -> Errors:
     fed, sensors = METHODS[method].fed, SENSORS[kind]
     if fed and "bias" in sensors:
         return dict.fromkeys(JUDGED, float("nan"))
-    return judged(program(method), ride, seeds if sensors else 1, fed=fed, **sensors)
+    return judged(program(method), ride, seeds if sensors else 1, sensors, fed)
 
 
 def estimate(method: str, ride: Scene, kind: str = "ideal") -> Estimate:

@@ -16,7 +16,7 @@ from codriver.papers.motorcycle2018.compare import SENSORS
 from codriver.papers.motorcycle2018.methods import RANGE, behind, calm_lmi, compiled, lmi, model, program
 from codriver.papers.motorcycle2018.rides import DT, RATE, WORDS, Errors, Scene, judged
 from codriver.papers.reproduction import Chapter
-from codriver.report.document import Chart, Curve, Findings, Plot, Table
+from codriver.report.document import Chart, Curve, Findings, Mark, Plot, Table
 
 PAPER_GAMMA = 0.0464
 TICKS = (0.01, 0.005, 0.002, 0.001)
@@ -73,7 +73,7 @@ def design_chapter(rides: Sequence[Scene], quick: bool) -> Chapter:
 
 
 def _judged(design: MotorcycleLMI, ride: Scene) -> Errors:
-    return judged(compiled(behind(motorcycle_ts_observer(design))), ride, 1, **SENSORS["noise"])
+    return judged(compiled(behind(motorcycle_ts_observer(design))), ride, 1, SENSORS["noise"])
 
 
 def _try(label: str, ride: Scene, fastest: float | None, scheduled: bool = True) -> Tried:
@@ -129,7 +129,7 @@ def _region(tried: Sequence[Tried]) -> Item:
     fast = float(np.abs(free.design.certificate.eigenvalues).max()) if free.design else float("nan")
     return Item(
         "the observer of the least gamma can be run", None, f"poles up to {fast:.2g} rad/s", "", fast < 2 * np.pi * RATE,
-        f"not in the paper, which makes gamma small and has no region for the poles; below 2 pi times the sensors' {RATE} Hz counts",
+        f"not in the paper, which makes gamma small and has no region for poles; below 2 pi times the sensors' {RATE} Hz counts",
     )  # fmt: skip
 
 
@@ -147,8 +147,8 @@ def _goal(main: MotorcycleLMI, calm: MotorcycleLMI, ride: Scene) -> Item:
 
 def _scheduling(main: MotorcycleLMI, constant: MotorcycleLMI, ride: Scene) -> Item:
     ratio = (
-        judged(program("constant"), ride, 1, **SENSORS["noise"])["roll_angle"]
-        / judged(program("ts"), ride, 1, **SENSORS["noise"])["roll_angle"]
+        judged(program("constant"), ride, 1, SENSORS["noise"])["roll_angle"]
+        / judged(program("ts"), ride, 1, SENSORS["noise"])["roll_angle"]
     )
     cost = constant.gamma / main.gamma - 1
     return Item(
@@ -211,14 +211,14 @@ def _table(tried: Sequence[Tried], ride: Scene) -> Table:
 
 
 def _euler_table(tried: Sequence[Tried]) -> Table:
-    rows = tuple(
+    rows: list[tuple[str | float | Mark | None, ...]] = [
         (t.label, *(float(np.abs(1 + dt * t.design.certificate.eigenvalues).max()) for dt in TICKS))
         for t in tried
         if t.design
-    )
+    ]
     return Table(
         ("design", *(f"{1 / dt:.0f} Hz" for dt in TICKS)),
-        rows,
+        tuple(rows),
         "Greatest pole of a forward Euler step; above 1 it diverges.",
     )
 

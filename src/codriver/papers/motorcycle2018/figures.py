@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,7 +57,9 @@ def figure_chapters(rides: Sequence[Scene]) -> list[Chapter]:
     Args:
         rides: one a scenario.
     """
-    return [_chapter(ride) for ride in rides]
+    made = [_chapter(ride) for ride in rides]
+    made[-1] = replace(made[-1], items=(*made[-1].items, _steering(rides)))
+    return made
 
 
 def _chapter(ride: Scene) -> Chapter:
@@ -72,18 +74,8 @@ def _chapter(ride: Scene) -> Chapter:
     items = [_perfectly(ride, place)]
     if ride.name == "double-lane-change":
         charts.append(_filtered(ride))
-    steer = DEGREE * float(np.abs(ride.truth["steer_angle"].values).max())
     if ride.name == "slalom":
         items += _slalom(ride)
-    said = {
-        "track": (2.0, "up to 2 deg"),
-        "slalom": (2.0, "up to 2 deg"),
-        "double-lane-change": (0.5, "-0.5 to 0.5 deg"),
-    }[ride.name]
-    items.append(Item(
-        f"V.C: steer angle, {name}", said[1], steer, "deg", 0.5 * said[0] <= steer <= 2 * said[0],
-        "the largest; on a course of our own, so half to twice counts",
-    ))  # fmt: skip
     return Chapter(f"{name.capitalize()}: figures {place.path} to {place.estimated + (ride.name == 'double-lane-change')} "
                    f"({place.section})", words, tuple(charts), tuple(items))  # fmt: skip
 
@@ -199,3 +191,23 @@ def _slalom(ride: Scene) -> list[Item]:
         "", 0.5 <= share[0] / share[1] <= 2.0,
         "RMSE of the roll over its rms, LMI with a = v W, ideal sensors; within a factor of two counts",
     )]  # fmt: skip
+
+
+def _steering(rides: Sequence[Scene]) -> Item:
+    """V.C: the slower the ride, the more is steered for the same turn."""
+    largest, bent = {}, {}
+    for ride in rides:
+        steer, t = ride.truth["steer_angle"].values, ride.truth
+        bend = t["heading_rate"].values * t["longitudinal_speed"].values  # m/s^2
+        largest[ride.name] = DEGREE * float(np.abs(steer).max())
+        bent[ride.name] = DEGREE * float(np.sqrt(np.mean(steer**2) / np.mean(bend**2)))
+    speed = {r.name: 3.6 * float(r.truth["longitudinal_speed"].values.mean()) for r in rides}
+    order = sorted(bent, key=lambda name: speed[name])
+    return Item(
+        "V.C: the slower, the more is steered", "2 deg on track and slalom, 0.5 in the lane change",
+        ", ".join(f"{WORDS[n]} {x:.1f}" for n, x in largest.items()) + " deg", "",
+        all(bent[a] > bent[b] for a, b in zip(order, order[1:], strict=False)),
+        "the largest steer angles, on courses of our own; judged by steer over lateral acceleration, rms, which must fall as "
+        "the mean "
+        "speed grows: " + ", ".join(f"{WORDS[n]} {bent[n]:.2f} deg per m/s² at {speed[n]:.0f} km/h" for n in order),
+    )  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -92,6 +93,7 @@ class Scene:
         return np.interp(time, self.truth[name].time, self.truth[name].values)
 
 
+@cache
 def scene(scenario: str, seconds: float | None = None, **machine: float) -> Scene:
     """Ride.
 
@@ -134,15 +136,15 @@ def sizes(ride: Scene, after: float = SETTLE) -> Errors:
     }
 
 
-def judged(program: Program, ride: Scene, seeds: int, *, fed: bool = False, **sensors: float) -> Errors:
+def judged(program: Program, ride: Scene, seeds: int, sensors: Mapping[str, float], fed: bool = False) -> Errors:
     """Errors over several readings of the sensors, RMS over all.
 
     Args:
         program: the observer.
         ride: to judge on.
         seeds: how many readings.
-        fed: it takes the measurements of (21), `Scene.measures`.
         sensors: see `Scene.log`; of `Scene.measures` the noise alone.
+        fed: it takes the measurements of (21), `Scene.measures`.
     """
     each = []
     for seed in range(1, seeds + 1):

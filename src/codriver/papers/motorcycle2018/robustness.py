@@ -44,7 +44,7 @@ def robustness_chapter(rides: Sequence[Scene], found: Compared, quick: bool, tel
         for nominal in chosen:
             ride = scene(nominal.name, nominal.record.setting.seconds, **machine) if machine else nominal
             for m in SHOWN:
-                errors[label, nominal.name, m] = judged(program(m), ride, 1, **{**SENSORS["noise"], **sensors})
+                errors[label, nominal.name, m] = judged(program(m), ride, 1, {**SENSORS["noise"], **sensors})
     items = (
         *_upright(chosen),
         *_paper(errors, chosen),

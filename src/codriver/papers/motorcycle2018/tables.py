@@ -13,7 +13,7 @@ from codriver.report.document import Table
 PAPER = {"track": (0.79, 0.84), "slalom": (1.09, 1.53), "double-lane-change": (1.08, 1.55)}
 KINDS = ("ideal", "noise")
 # Table II: what it has of others, degrees.
-OTHERS = {"imu": 2.01, "uio": (1.28, 1.85)}
+IMU, UIO = 2.01, (1.28, 1.85)
 ALIKE = 1.25
 
 
@@ -79,11 +79,11 @@ def _second(found: Compared) -> tuple[Item, ...]:
     uio = [found.roll("uio", "track", kind) for kind in KINDS]
     made = [
         Item("table II: vision system, and mean of vision and IMU", "2.24 and 1.20 deg", "no camera here", "", None, "of [26]"),
-        Item("table II: IMU with a Kalman filter", OTHERS["imu"], plain, "deg", plain <= ALIKE * OTHERS["imu"],
+        Item("table II: IMU with a Kalman filter", IMU, plain, "deg", plain <= ALIKE * IMU,
              f"of [26], on another track; ours is a point mass on thin tyres, and {imu:.2f} with the tyres' width: what wide tyres "
              f"take and what large leans add nearly cancel. At most {ALIKE:g} times counts"),
     ]  # fmt: skip
-    for k, (paper, ours) in enumerate(zip((1.28, 1.85), uio, strict=True)):
+    for k, (paper, ours) in enumerate(zip(UIO, uio, strict=True)):
         made.append(Item(
             f"table II: unknown-input observer, {'ideal' if k == 0 else 'realistic'} "
             f"sensors", paper, ours, "deg", ours <= ALIKE * paper,
