@@ -33,10 +33,11 @@ NAMES = (
     "end_to_end",
     "memory",
     "identification",
+    "learned",
 )
 LIBRARIES = (
     "codriver", "numpy", "scipy", "casadi", "llvmlite", "pyarrow", "cantools", "python-can", "asammdf", "pandas", "filterpy",
-    "statsmodels", "numba",
+    "statsmodels", "numba", "scikit-learn", "hmmlearn", "gmr",
 )  # fmt: skip
 RESULTS = Path(__file__).with_name("RESULTS.md")
 LIMITS = """## What limits the rest

@@ -61,7 +61,7 @@ def _steady(value: float):
 def leaning_ride() -> Ride:
     """4.5 s at 70 km/h: to 30 degrees to the right and over to the left."""
     lean = lambda t: 0.55 * np.sin(2 * np.pi * max(t - 0.5, 0.0) / 5.0)  # noqa: E731
-    return ride(Rider(machine(), lambda _x: 0.0, _steady(70 * KMH), lean=lean), 4.5)
+    return ride(Rider(machine(), slalom(0.0, 100.0), _steady(70 * KMH), lean=lean), 4.5)
 
 
 @cache

@@ -28,7 +28,7 @@ ONE_LAP = CircuitSetting(laps=1, direction="left")
 
 
 def on_path(setting: CircuitSetting, path: PathAhead, n: int) -> np.ndarray:
-    return _drive(setting, path, n, Variation.none(n))
+    return _drive(setting, path, n, Variation.none(n), np.zeros(n), None)
 
 
 class TestWay:

@@ -76,6 +76,23 @@ def test_evaluate_holds_drives_out_and_says_who_wins(laps: Path, tmp_path: Path)
     assert "verdict" in said
 
 
+def test_error_against_horizon(laps: Path, tmp_path: Path) -> None:
+    report, vehicle = tmp_path / "horizon.html", laps / "anna" / "vehicle.toml"
+    command = ("driver", "horizon", laps / "anna.csv", laps / "anna2.csv", *names(laps), "--model", "ridge")
+    told = json.loads(ran(*command, "--horizons", "0.2,1", "--vehicle", vehicle, "--report", report, "--json"))
+    made = {(row["model"], row["form"]): row["rmse_Nm"] for row in told["models"]}
+    assert list(made) == [("pwc", "direct"), ("pwl", "direct"), ("ridge", "direct"), ("ridge", "iterated")]
+    assert made["ridge", "direct"][1] < 0.5 * made["pwc", "direct"][1]
+    assert told["held_out"] == ["anna", "anna2"]
+    assert "Forecasts, one a second" in report.read_text()
+    said = ran(*command, "--horizons", "0.5", "--vehicle", "okamoto2019-simulator")
+    assert "not iterated: " in said
+    assert "0.5 s" in said
+    done = CliRunner().invoke(app, ["driver", "horizon", str(laps / "anna.csv"), "--horizons", "0.2,later"])
+    assert isinstance(done.exception, CodriverError)
+    assert "positive numbers" in str(done.exception)
+
+
 def test_compare_names_the_driver(laps: Path, tmp_path: Path) -> None:
     for name in ("anna", "carla"):
         ran("driver", "fit", laps / f"{name}.csv", *names(laps), "--model", "ridge", "-o", tmp_path / f"{name}.driver")

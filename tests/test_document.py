@@ -101,3 +101,17 @@ def test_bands_bars_spans_and_boxes() -> None:
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="cannot be written"):
         write_document(Document("t", "l", ()), tmp_path / "no" / "page.html")
+
+
+def test_words_along_an_axis_are_all_shown_in_lines_that_fit():
+    words = ["PWC", "ANN (2), weight decay", "a<b"] + [f"method {k}" for k in range(9)]
+    bars = Curve("", words, np.ones(12), kind="bars")
+    figure = chart_figure(Chart("", "", (Plot("", (bars,), height=200),)))
+    axis = figure["layout"]["xaxis"]
+    assert axis["tickvals"] == words
+    assert axis["ticktext"][:3] == ["PWC", "ANN (2),<br>weight decay", "a&lt;b"]
+    few = chart_figure(Chart("", "", (Plot("", (Curve("", words[:3], np.ones(3), kind="bars"),), height=200),)))
+    assert few["layout"]["xaxis"]["ticktext"][1] == words[1]
+    # The axis gets the room that its second line takes.
+    assert figure["layout"]["margin"]["b"] > few["layout"]["margin"]["b"]
+    assert figure["layout"]["height"] - few["layout"]["height"] == 16

@@ -14,9 +14,11 @@ from codriver.identify.driver_fit import ASKED, identify_driver
 from codriver.identify.driver_record import driver_record
 from codriver.identify.driver_residual import whitened, whitening
 from codriver.identify.driver_road import by_the_road
+from codriver.identify.driver_verdict import driver_findings
 from codriver.models.two_point import TwoPointDriver
 from codriver.simulate.circuit import CircuitSetting, simulate_circuit
 from codriver.simulate.circuit_drivers import CIRCUIT_DRIVERS
+from codriver.simulate.rig import RigCar
 from codriver.simulate.steering import Wheel
 from codriver.simulate.variability import Variability
 
@@ -61,7 +63,7 @@ class TestClean:
         assert fit.explained > 0.999
         assert fit.rms == pytest.approx(0.02, rel=0.1)  # of the torque sensor
         assert fit.driver().anticipation == fit.parameters["anticipation"].value
-        assert np.std(fit.record.torque - fit.torque()) < 0.05
+        assert np.std(fit.records[0].torque - fit.torque()) < 0.05
 
     @pytest.mark.slow
     @pytest.mark.parametrize("name", CIRCUIT_DRIVERS)
@@ -77,7 +79,7 @@ class TestClean:
         # Offset and heading error summed from yaw rate and sideslip, behind a high-pass.
         truth = CIRCUIT_DRIVERS["carla"]
         fit = identify_driver(without(clean, "lateral_offset", "heading_error"), start(truth), by="direct")
-        assert fit.record.summed
+        assert fit.records[0].summed
         for name, within in (("anticipation", 0.01), ("compensation", 0.05), ("reflex", 0.03)):
             assert fit.parameters[name].value == pytest.approx(getattr(truth, name), rel=within)
 
@@ -149,6 +151,10 @@ class TestRefusals:
         assert row[:3] == ("anticipation", "K_p", "1")
         assert row[5] < row[3] < row[6]
 
+    def test_all_held(self, clean):
+        with pytest.raises(UsageError, match="every parameter is held"):
+            identify_driver(clean, held=ASKED)
+
     def test_errors(self, clean):
         for change in (
             {"asked": ()},
@@ -159,6 +165,9 @@ class TestRefusals:
         ):
             with pytest.raises(UsageError):
                 identify_driver(clean, **change)
+        for drives, by in (([], "road"), ([clean, clean], "dual-ekf")):
+            with pytest.raises(UsageError, match=f"{len(drives)} drives"):
+                identify_driver(drives, by=by)
         with pytest.raises(MissingSignal, match="road_curvature"):
             identify_driver(without(clean, "road_curvature"))
         with pytest.raises(MissingSignal, match="yaw_rate"):
@@ -191,6 +200,85 @@ class TestRefusals:
             identify_driver(log)
 
 
+class TestSeveral:
+    @pytest.mark.slow
+    def test_two_speeds_tell_what_one_does_not(self):
+        truth = replace(CIRCUIT_DRIVERS["carla"], column_gain=0.2)
+        car = RigCar()
+        slow, quick = (
+            simulate_circuit(
+                CircuitSetting(truth, laps=1, direction=way, car=replace(car, speed=v / 3.6)), seed=1
+            ).log()
+            for v, way in ((35, "left"), (50, "right"))
+        )
+        fit = identify_driver([slow, quick], start(truth))
+        assert fit.names == (*ASKED, "column_gain")
+        assert fit.speeds == pytest.approx((35 / 3.6, 50 / 3.6))
+        for name, within in (("column_gain", 0.1), ("anticipation", 0.05), ("reflex", 0.05)):
+            assert fit.parameters[name].value == pytest.approx(getattr(truth, name), rel=within)
+            assert fit.parameters[name].sd < within * fit.parameters[name].value
+        # The drives of one speed, together, do not.
+        alone = identify_driver(
+            [quick, quick], start(truth), asked=("anticipation", "column_gain", "compensation", "reflex")
+        )
+        assert {r.name for r in alone.refused} == {"anticipation", "column_gain", "compensation", "reflex"} - {"reflex"}
+        assert "these drives are at one" in alone.refused[0].reason
+
+    @pytest.mark.slow
+    def test_twice_the_drive_is_half_the_variance(self, varied):
+        # A drive given twice: same values where the drive outweighs what was known, and errors smaller by up to sqrt(2).
+        known = start(CIRCUIT_DRIVERS["carla"])
+        once, twice = (identify_driver(d, known, asked=("anticipation",)) for d in (varied, [varied, varied]))
+        a, b = once.parameters["anticipation"], twice.parameters["anticipation"]
+        assert b.value == pytest.approx(a.value, rel=0.02)
+        assert b.sd == pytest.approx(a.sd / np.sqrt(2), rel=0.1)
+        assert twice.seconds == pytest.approx(2 * once.seconds)
+
+    def test_torque_with_gaps(self, clean):
+        # An estimate's torque is no number where it is not valid.
+        torque = clean["driver_torque"]
+        holed = torque.values.copy()
+        holed[:300] = np.nan
+        holed[20_000:20_030] = np.nan
+        log = clean.with_signals(cd.Signal("driver_torque", torque.time, holed, "N*m", "estimate: driver-torque-pi"))
+        truth = CIRCUIT_DRIVERS["carla"]
+        fit = identify_driver(log, truth, asked=("anticipation", "reflex"))
+        assert fit.parameters["anticipation"].value == pytest.approx(truth.anticipation, rel=0.02)
+        assert fit.estimated == ("estimate: driver-torque-pi",)
+        assert any("estimate's lag" in f.text for f in driver_findings(fit))
+        holed[30_000:30_100] = np.nan
+        with pytest.raises(LogError, match=r"holes in driver_torque 1\.0 s"):
+            identify_driver(clean.with_signals(cd.Signal("driver_torque", torque.time, holed, "N*m")))
+
+
+class TestVerdict:
+    @pytest.mark.slow
+    def test_who_varies(self, clean, varied):
+        known = start(CIRCUIT_DRIVERS["carla"])
+        said = {
+            (who, by): " ".join(f.text for f in driver_findings(identify_driver(log, known, by=by)))
+            for who, log in (("same", clean), ("varies", varied))
+            for by in ("road", "direct")
+        }
+        assert "always the same" in said["same", "road"]
+        assert "always the same" in said["same", "direct"]
+        assert "what the road makes" in said["varies", "road"]
+        assert "biases prediction errors" in said["varies", "direct"]
+
+    @pytest.mark.slow
+    def test_dual_filter_is_warned_of(self, varied):
+        fit = identify_driver(varied, start(CIRCUIT_DRIVERS["carla"]), by="dual-ekf")
+        assert fit.path is not None
+        assert fit.path.values[-1] == pytest.approx([getattr(fit.best, n) for n in fit.names])
+        said = [f for f in driver_findings(fit) if f.severity == "warn"]
+        assert any("filter's own" in f.text for f in said)
+        # It fits well, is sure, and is wrong.
+        truth = CIRCUIT_DRIVERS["carla"]
+        sure = [abs(np.log(p.value / getattr(truth, p.name))) / (p.sd / p.value) for p in fit.parameters.values()]
+        assert fit.explained > 0.95
+        assert max(sure) > 3
+
+
 class TestParts:
     def test_what_he_saw(self, clean):
         drive = simulate_circuit(CircuitSetting(CIRCUIT_DRIVERS["carla"], laps=2), seed=1)
@@ -204,9 +292,9 @@ class TestParts:
         from scipy.signal import lfilter
 
         v = lfilter([1.0], [1.0, -1.5, 0.7], rng.standard_normal(50_000))
-        a = whitening(v)
+        a = whitening([v])
         assert np.allclose(a[:4], [1, -1.5, 0.7, 0], atol=0.02)
-        e = whitened(a, v)
+        e = whitened(a, [v])
         assert e.std() == pytest.approx(1, rel=0.02)
         assert abs(np.corrcoef(e[1:], e[:-1])[0, 1]) < 0.02
 

@@ -13,15 +13,17 @@ from codriver.drivers.learned import rollout
 from codriver.drivers.learned.calibration import Calibration
 from codriver.drivers.learned.feature_setting import FeatureSetting
 from codriver.drivers.learned.features import features_of
-from codriver.drivers.learned.horizon import HorizonErrors, error_against_horizon
+from codriver.drivers.learned.horizon import error_against_horizon
+from codriver.drivers.learned.horizon_errors import HorizonErrors
 from codriver.drivers.learned.learned_driver import LearnedDriver, fit_driver
 from codriver.drivers.learned.protocol import Protocol
 from codriver.drivers.learned.regressor import TorqueRegressor
 from codriver.drivers.learned.rollout import ColumnAndCar, Motion, check_rollable, roll_out, wheel_rates
 from codriver.drivers.learned.scaling import Scaling
 from codriver.errors import MissingSignal, UsageError
-from codriver.signals import Log
+from codriver.signals import Log, Signal
 from codriver.simulate.circuit import CircuitSetting, simulate_circuit
+from codriver.simulate.circuit_files import circuit_vehicle
 from codriver.simulate.rig import RigCar
 from codriver.simulate.steering import Wheel
 from codriver.vehicles import Vehicle
@@ -34,14 +36,8 @@ WIDE = {"driver_torque": 1e6, "steering_wheel_angle": 1e6, "yaw_rate": 1e6, "sid
 
 def vehicle(**changes: float) -> Vehicle:
     """That of the circuit."""
-    made = Vehicle("circuit", "the circuit's", "simulation", {})
-    values = {
-        "mass": CAR.mass, "yaw_inertia": CAR.inertia, "front_axle_distance": CAR.front, "wheelbase": CAR.front + CAR.rear,
-        "front_cornering_stiffness": CAR.front_stiffness, "rear_cornering_stiffness": CAR.rear_stiffness,
-        "steering_ratio": CAR.ratio, "alignment_stiffness": CAR.alignment, "steering_inertia": WHEEL.inertia,
-        "steering_damping": WHEEL.damping, "steering_friction": WHEEL.friction,
-    }  # fmt: skip
-    for name, value in {**values, **changes}.items():
+    made = circuit_vehicle(CircuitSetting(wheel=WHEEL, car=CAR))
+    for name, value in changes.items():
         made = made.with_parameter(name, value)
     return made
 
@@ -155,6 +151,9 @@ def test_rate_of_the_wheel_as_logged_or_from_the_angle() -> None:
     assert np.std(wheel_rates(drive.log(), time, 0.1) - truth) < 0.06 * np.std(truth)
     logged = drive.log().with_signals(drive.truth()["steering_wheel_rate"])
     assert np.allclose(wheel_rates(logged, time, 0.1), truth, atol=1e-9)
+    # A wheel whose first stamp lies between the ticks of the others is read at their ticks all the same, not later.
+    late = Log.of([s.between(0.07, 1e9) if s.name == "steering_wheel_rate" else s for s in logged.values()])
+    assert np.allclose(wheel_rates(late, time, 0.1), truth, atol=1e-9)
 
 
 def test_what_diverges_is_held_and_counted() -> None:
@@ -211,13 +210,69 @@ def test_without_a_vehicle_or_with_several_drives() -> None:
     found = error_against_horizon(drives, ("ridge", "pwc"), (0.4,))
     assert found.folds == ("one", "two")
     assert not found.iterated
-    assert list(found.direct) == ["pwc", "ridge"]
+    assert list(found.direct) == ["pwc", "pwl", "ridge"]
+
+
+def test_nothing_of_the_future_but_the_road() -> None:
+    drives = {"one": driven(direction="left"), "two": driven(seed=2, direction="left")}
+    moment = 60.0
+
+    def spoilt(signal: Signal) -> Signal:
+        kept = signal.name in ("road_curvature", "longitudinal_speed")  # together they are the map
+        return signal if kept else replace(signal, values=np.where(signal.time > moment + 1e-6, 7.0, signal.values))
+
+    changed = {**drives, "two": Log.of([spoilt(s) for s in drives["two"].values()], source="two")}
+    before, after = (error_against_horizon(d, ("ridge",), (0.3, 1.0), vehicle()) for d in (drives, changed))
+    for found in (before, after):
+        assert found.folds == ("one", "two")
+    known = [(f.part == 1) & (f.time <= moment + 1e-6) for f in (before, after)]
+    assert known[0].sum() > 500
+    for key in before.made:
+        assert np.array_equal(before.made[key][known[0]], after.made[key][known[1]])
+    assert not np.array_equal(before.truth[known[0]], after.truth[known[1]])
+
+
+def test_between_steps_the_iterated_torque_runs_straight() -> None:
+    found = error_against_horizon({"anna": driven()}, ("ridge",), (0.1, 0.2, 0.3, 0.4), vehicle())
+    made = found.made["iterated", "ridge"]
+    assert np.allclose(made[:, 0], (found.now + made[:, 1]) / 2)
+    assert np.allclose(made[:, 2], (made[:, 1] + made[:, 3]) / 2)
+    assert np.allclose(
+        found.made["direct", "pwl"][:, 3] - found.now, 4 * (found.made["direct", "pwl"][:, 0] - found.now)
+    )
+
+
+def test_moments_are_matched_on_any_clock() -> None:
+    """Stamps since 1970, and between whole ticks: the same errors as from 0 on."""
+    log = driven(direction="left")
+    moved = Log.of([replace(s, time=s.time + 1479424215.05) for s in log.values()], source="moved")
+    plain, late = (error_against_horizon({"a": one}, ("ridge",), (0.2, 1.0), vehicle()) for one in (log, moved))
+    assert late.rows == plain.rows
+    for key in plain.made:
+        assert np.allclose(late.rmse(*key), plain.rmse(*key), rtol=1e-4)
+
+
+def test_errors_part_by_part() -> None:
+    found = judged()
+    each, whole = found.parts("direct", "ridge"), found.rmse("direct", "ridge")
+    rows = np.bincount(found.part)
+    assert np.allclose(np.sqrt((rows[:, None] * each**2).sum(axis=0) / rows.sum()), whole)
+    assert np.allclose(found.spread("direct", "ridge"), [np.std(c, ddof=1) / 2 for c in each.T])
+
+
+def test_a_road_that_is_not_known_is_no_hindrance() -> None:
+    log = Log.of([s for s in driven(direction="left").values() if s.name != "road_curvature"], source="bare")
+    found = error_against_horizon({"bare": log}, ("ridge",), (0.2, 0.4), vehicle())
+    assert found.road == 0
+    assert found.iterated["ridge"][0] == pytest.approx(found.direct["ridge"][0], rel=1e-12)
 
 
 def test_refusals() -> None:
     log = driven()
-    with pytest.raises(UsageError, match=r"horizons 0\.3 s"):
-        error_against_horizon({"anna": log}, ("ridge",), (0.3,))
+    with pytest.raises(UsageError, match=r"horizons 0\.25 s"):
+        error_against_horizon({"anna": log}, ("ridge",), (0.25,))
+    with pytest.raises(UsageError, match=r"a horizon of 2\.8 s"):
+        error_against_horizon({"anna": log}, ("ridge",), (2.6, 2.8))
     with pytest.raises(UsageError, match="has a memory"):
         error_against_horizon({"anna": log}, ("hmm-gmr",), (0.2,), vehicle())
     bare = Log.of([s for s in log.values() if s.name != "sideslip_angle"], source="bare")

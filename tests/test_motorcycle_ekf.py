@@ -13,6 +13,7 @@ from codriver.errors import DesignError
 from codriver.models.motorcycle_lean import LeanParameters, lean_functions
 from codriver.names import quantity
 from codriver.observers import motorcycle_ekf as ekf
+from codriver.report.panels import panels
 from codriver.testing import check_observer
 from rides import BIASES, DEGREE, errors, lane_change_ride, leaning_ride, noisy, ride_log, rms, slalom_ride, vehicle
 
@@ -46,9 +47,8 @@ def textbook(
         return np.concatenate([np.asarray(f(x[:10], v, dv, np.sin(x[0]), np.cos(x[0]))).ravel(), (decay * x)[8:]])
 
     def heave(x):
-        S, C = np.sin(x[0]), np.cos(x[0])
-        swing = rate(x)[4] * C - x[4] ** 2 * S
-        return (rho - Z) * (rate(x)[4] * S + x[4] ** 2 * C) + n * swing
+        S, C, rolling = np.sin(x[0]), np.cos(x[0]), rate(x)[4]
+        return (rho - Z) * (rolling * S + x[4] ** 2 * C) + n * (rolling * C - x[4] ** 2 * S)
 
     def rows(x):
         a, S, C = rate(x)[2:5], np.sin(x[0]), np.cos(x[0])
@@ -101,12 +101,12 @@ def textbook(
 
 
 class TestAgainstTextbook:
-    def test_states_and_bands(self, parameters, quick):
-        """From the middle of a turn at 1 kHz; ours has one derivative from the tick's start."""
-        done, dt, count = leaning_ride(), 0.001, 60
+    def test_states_and_bands(self, parameters, program):
+        """From the middle of a turn; ours has one derivative from the tick's start."""
+        done, dt, count = leaning_ride(), 0.005, 60
         log = ride_log(done, noisy(done), start=1300)
         noise = ekf.EkfNoise()
-        found = quick.run(log)
+        found = program.run(log)
         x, sd = textbook(parameters, log, dt, count, noise)
         for i, name in enumerate(ekf.STATES):
             size = sd[-1, i]
@@ -136,26 +136,27 @@ class TestRide:
         assert estimate.check().trusted
 
     def test_from_the_middle_of_a_turn(self, program):
-        """The log begins at 27 degrees."""
+        """The log begins at 25 degrees."""
         done = leaning_ride()
         log = ride_log(done, noisy(done), start=1750)
         found = program.run(log)
-        assert done.of("roll")[1750] > 26 * DEGREE
+        assert done.of("roll")[1750] > 24 * DEGREE
         assert found["roll_angle"].values[0] > 15 * DEGREE
         assert rms(errors(found, done, "roll_angle", 0.5)) < 1.5 * DEGREE
 
     def test_rows_that_are_missing(self, program):
-        """Without pitch rate and vertical acceleration, half the steer angles and a tenth of the speeds."""
+        """Without pitch rate and vertical acceleration, steer at 50 Hz and speed at 10 Hz, never on the same tick."""
         done = leaning_ride()
         full = ride_log(done, noisy(done))
-        keep = {"steer_angle": 10, "longitudinal_speed": 50}
+        pick = {"steer_angle": slice(3, None, 20), "longitudinal_speed": slice(7, None, 100)}
         signals = [
-            cd.Signal(name, s.time[:: keep.get(name, 1)], s.values[:: keep.get(name, 1)], s.unit)
+            cd.Signal(name, s.time[pick.get(name, slice(None))], s.values[pick.get(name, slice(None))], s.unit)
             for name, s in full.items()
             if name not in ("pitch_rate", "vertical_acceleration")
         ]
         found = program.run(cd.Log.of(signals))
-        assert rms(errors(found, done, "roll_angle")) < 1.2 * DEGREE
+        assert rms(errors(found, done, "roll_angle")) < 1.5 * DEGREE
+        assert found.valid[100:].all()
         assert (found.columns["pitch_rate_innovation"] == 0).all()
 
     def test_an_outage_is_told_and_survived(self, program):
@@ -168,6 +169,22 @@ class TestRide:
         assert found.columns["roll_angle_sd"][k] > 1.5 * found.columns["roll_angle_sd"][int(1.49 / 0.005)]
         assert found.valid[-100:].all()
         assert rms(errors(found, done, "roll_angle", 2.5)) < 0.6 * DEGREE
+
+
+def test_report(estimate):
+    """Lean first, then torque, forces, steer, biases; flags only where one is raised; truth beside where it is there."""
+    done = leaning_ride()
+    truth = cd.Log.of([cd.Signal("roll_angle", done.time, done.of("roll"), "rad")])
+    made = panels(estimate, truth)
+    titles = [panel.title.split(",")[0] for panel in made]
+    assert titles[:4] == [
+        "Lean of the machine", "Torque of the rider on the handlebar", "Lateral forces of the tyres", "Steer angle",
+    ]  # fmt: skip
+    assert len(set(titles)) == len(titles)
+    assert [item.name for item in made[0].items] == ["95% band", "estimate, not valid", "estimate", "true"]
+    assert {"Biases of the gyroscope", "Biases of the accelerometer", "Flags"} <= set(titles)
+    flags = made[titles.index("Flags")]
+    assert [line.name for line in flags.items] == ["not valid"]
 
 
 def at_rest(roll: np.ndarray, t: np.ndarray, gyro_bias: float) -> cd.Log:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
 import codriver as cd
 from codriver.errors import DesignError
+from codriver.export import export_c
 from codriver.models import MotorcycleParameters, motorcycle_model
 from codriver.models.motorcycle_lean import LeanParameters
 from codriver.observers import best, build
@@ -20,7 +24,6 @@ from codriver.testing import check_observer
 from rides import DEGREE, errors, lane_change_ride, leaning_ride, noisy, ride_log, rms, slalom_ride, vehicle
 
 LOW, HIGH, DT = 8.0, 40.0, 0.005
-ALL = ("motorcycle-ekf", "motorcycle-kalman", "motorcycle-ts", "motorcycle-uio", "motorcycle-imu")
 
 
 @pytest.fixture(scope="module")
@@ -161,11 +164,31 @@ class TestFamily:
         assert made.provenance["vehicle"] == "sharp1971"
 
     def test_heading_rate_is_the_roads(self):
+        outputs = [o.name for o in build("motorcycle-uio", vehicle(), dt=0.01).outputs]
+        assert "heading_rate" in outputs
+        assert "yaw_rate" not in outputs
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "form", "real"),
+    [
+        ("motorcycle-ekf", "kalman", "double"), ("motorcycle-kalman", "constant", "float"), ("motorcycle-ts", "kalman", "float"),
+        ("motorcycle-uio", "kalman", "double"),
+    ],
+)  # fmt: skip
+def test_exported(name, form, real, tmp_path):
+    """In C as here: bit for bit in double, within the README's tolerance in float."""
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    if name == "motorcycle-ts":
         pytest.importorskip("cvxpy")
-        for name in ("motorcycle-ts", "motorcycle-uio"):
-            outputs = [o.name for o in build(name, vehicle(), dt=0.01).outputs]
-            assert "heading_rate" in outputs
-            assert "yaw_rate" not in outputs
+    export_c(cd.compile(build(name, vehicle(), dt=0.01, form=form)), tmp_path, real)
+    sources = sorted(map(str, tmp_path.glob("*.c")))
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off"]
+    subprocess.run(["gcc", *strict, *sources, "-o", tmp_path / "check", "-lm"], check=True)
+    ran = subprocess.run([tmp_path / "check"], capture_output=True, text=True)
+    assert ran.stdout.startswith("ok: 400 rows"), ran.stdout
 
 
 @pytest.mark.slow

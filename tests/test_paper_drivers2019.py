@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from codriver.drivers.learned import evaluate
+from codriver.identify.driver_fit import ASKED
 from codriver.papers.drivers2019 import BY_PI, _figure_chapter, findings, leak_chapter
+from codriver.papers.drivers2019.identified import START, TRUTH, figure_15_chapter, identified, off
 from codriver.papers.drivers2019.judge import HONEST, LEARNT, METHODS, Judged, judge
 from codriver.papers.drivers2019.recorded import lincoln_chapter, race_chapter, recorded_chapters
 from codriver.papers.drivers2019.scenes import human, observed, regenerated
@@ -117,6 +119,44 @@ class TestMade:
         assert "What the leak is worth" in text
         assert "inverse dynamics" in text
         assert "NaN" not in data.read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+class TestIdentified:
+    """Figure 15, on one drive."""
+
+    @pytest.fixture(scope="class")
+    def drivers(self):
+        return identified((1,))
+
+    def test_chapter(self, drivers, varied, tmp_path):
+        chapter = figure_15_chapter(drivers, (1,), varied)
+        assert not found(chapter.items, "identified by a dual EKF").holds
+        for part in ("drives around the track", "torque is like the human's", "remark 4"):
+            assert found(chapter.items, part).holds, part
+        for part in ("dual EKF, a driver who does not vary", "by the road, a driver who does not vary"):
+            assert found(chapter.items, part).holds, part
+        assert sum("fig. 16 by the identified driver" in item.item for item in chapter.items) == 2
+        page, data = Reproduction("drivers2019", "t", "c", "l", (chapter,)).write(tmp_path)
+        assert "Figure 15: torque of the driver identified" in page.read_text(encoding="utf-8")
+        assert "NaN" not in data.read_text(encoding="utf-8")
+
+    def test_every_way_starts_wrong(self, drivers):
+        for name in ASKED:
+            assert 0.19 < abs(getattr(START, name) / getattr(TRUTH, name) - 1) < 0.51
+        assert all(fit.known is START for fit in (*drivers.dual, *drivers.road, drivers.still, drivers.still_road))
+
+    def test_off_is_in_standard_errors(self, drivers):
+        fit = drivers.still_road
+        for name, x in off(fit).items():
+            p = fit.parameters[name]
+            assert x == pytest.approx(abs(np.log(p.value / getattr(TRUTH, name))) / (p.sd / p.value))
+
+    def test_who_leaves_the_road_is_counted(self, drivers, varied):
+        gone = replace(drivers, again=(None,))
+        chapter = figure_15_chapter(gone, (1,), varied)
+        assert not found(chapter.items, "drives around the track").holds
+        assert not any("fig. 16 by" in item.item for item in chapter.items)
 
 
 class TestRecordings:

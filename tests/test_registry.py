@@ -54,7 +54,7 @@ def test_another_family_is_never_the_best_of_this_one(toy, car):
     assert best(angle, None, family="torque").estimator == "toy-wheel"
     assert [f.estimator for f in feeds(EVERYTHING, car, "torque")] == ["toy-wheel"]
     assert {f.family for f in feeds(EVERYTHING, car)} == set(families())
-    with pytest.raises(UsageError, match="intent, driver-torque, torque"):
+    with pytest.raises(UsageError, match="intent, driver-torque, motorcycle, torque"):
         best(angle, None, family="weather")
 
 

@@ -70,7 +70,6 @@ _ENTRIES = (
         -7,
         7,
     ),
-    Quantity("pitching", "rad/s", "deg/s", "theta'", "pitch rate of a leaning machine beside that of its turn", -3, 3),
     Quantity("roll_rate", "rad/s", "deg/s", "p", "rotation about x, positive when the right side goes down", -7, 7),
     Quantity("pitch_rate", "rad/s", "deg/s", "q", "rotation about y, positive when the nose goes down", -7, 7),
     Quantity("roll_angle", "rad", "deg", "phi", "positive when leaning to the right", -pi / 2, pi / 2),
@@ -80,6 +79,7 @@ _ENTRIES = (
     Quantity("latitude", "deg", "deg", "lat", "north positive", -90, 90),
     Quantity("longitude", "deg", "deg", "lon", "east positive", -180, 180),
     Quantity("altitude", "m", "m", "h", "height above sea level", -500, 9000),
+    Quantity("pitching", "rad/s", "deg/s", "theta'", "pitch rate of a leaning machine beside that of its turn", -3, 3),
     # what the person does
     Quantity(
         "accelerator_pedal", "1", "%", "p_r", "accelerator pedal position, 0 released to 1 fully pressed", -0.02, 1.02

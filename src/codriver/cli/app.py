@@ -17,10 +17,10 @@ from codriver import __version__
 from codriver.cli import (
     check,
     demo,
-    driver_use,
+    driver_horizon,
     estimate,
     export,
-    identify_alignment,
+    identify_driver,
     info,
     plot,
     reproduce,
@@ -44,10 +44,10 @@ app.command("demo")(demo.demo)
 app.command("info")(info.info)
 app.command("estimate")(estimate.estimate)
 app.command("smooth")(smooth.smooth)
-app.add_typer(identify_alignment.app, name="identify")
+app.add_typer(identify_driver.app, name="identify")
 app.command("tune")(tune.tune)
 app.command("style")(style.style)
-app.add_typer(driver_use.app, name="driver")
+app.add_typer(driver_horizon.app, name="driver")
 app.add_typer(check.app, name="check")
 app.add_typer(plot.app, name="plot")
 app.add_typer(simulate.app, name="simulate")

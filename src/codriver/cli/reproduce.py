@@ -51,7 +51,7 @@ def _make(papers: list[str], out: Path, recordings: Path, quick: bool) -> None:
 
     screen = console()
     for name in papers:
-        with working(True, 3) as stage:
+        with working(True, None) as stage:
             made = make(name, stage, quick=quick, recordings=recordings)
         page, data = made.write(out, command_line())
         screen.print(f"{name}: {len(made.items)} items", markup=False)

@@ -9,6 +9,7 @@ import typer
 
 from codriver.cli.simulate_circuit import circuit
 from codriver.cli.simulate_motorcycle import motorcycle
+from codriver.cli.simulate_shared import shared
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 app = typer.Typer(help="Simulate a long drive with known truth.", no_args_is_help=True, rich_markup_mode=None)
 app.command("circuit")(circuit)
 app.command("motorcycle")(motorcycle)
+app.command("shared")(shared)
 
 Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.", show_default=False)]
 Driver = Annotated[str, typer.Option("--driver", help="aggressive, anticipating, ordinary, nervous, smooth or brisk.")]

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+if TYPE_CHECKING:
+    from codriver.models.two_point import TwoPointDriver
+    from codriver.simulate.rig import RigCar
+
 Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.", show_default=False)]
-Driver = Annotated[str, typer.Option("--driver", help="anna, ben, carla, david or emma.")]
+Driver = Annotated[
+    str, typer.Option("--driver", help="anna, ben, carla, david, emma, or a file of codriver identify driver (TOML).")
+]
+Given = Annotated[
+    str,
+    typer.Option(
+        "--given", metavar="NAMES", help="Of a driver file: parameters it does not tell, taken as they were given."
+    ),
+]
 Varied = Annotated[
     bool, typer.Option("--variability/--no-variability", help="A driver whose gains drift and who is noisy.")
 ]
@@ -23,6 +35,7 @@ Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier
 def circuit(
     out: Out,
     driver: Driver = "anna",
+    given: Given = "",
     variability: Varied = True,
     laps: Laps = 4,
     seed: Seed = 0,
@@ -37,25 +50,18 @@ def circuit(
 
     Example: codriver simulate circuit -o laps --driver ben
     """
-    from dataclasses import replace
-
     from codriver.cli.terminal import console
-    from codriver.errors import UsageError
     from codriver.identify.regression import rms
     from codriver.simulate.circuit import CircuitSetting
-    from codriver.simulate.circuit_drivers import circuit_driver
     from codriver.simulate.circuit_files import FILES, write_circuit
     from codriver.simulate.folder import refuse_earlier, refuse_foreign
-    from codriver.simulate.rig import RigCar
     from codriver.simulate.variability import Variability
 
     refuse_foreign(out, "circuit", FILES)
     refuse_earlier(out, overwrite)
-    if not 10 <= speed <= 120:
-        raise UsageError(f"--speed {speed:g}", "10 to 120 km/h", "choose one of these")
     setting = CircuitSetting(
-        circuit_driver(driver), Variability() if variability else None, anticipation, laps=laps, direction=direction,
-        car=replace(RigCar(), speed=speed / 3.6),
+        who_drives(driver, given), Variability() if variability else None, anticipation, laps=laps, direction=direction,
+        car=car_at(speed),
     )  # fmt: skip
     files, drive = write_circuit(out, setting, seed)
     console().print(
@@ -66,3 +72,37 @@ def circuit(
         f"wrote {', '.join(str(p) for p in vars(files).values())}",
         markup=False,
     )
+
+
+def car_at(speed: float) -> RigCar:
+    """The circuit's car at a speed, km/h.
+
+    Raises:
+        UsageError: it is no speed for the circuit.
+    """
+    from dataclasses import replace
+
+    from codriver.errors import UsageError
+    from codriver.simulate.rig import RigCar
+
+    if not 10 <= speed <= 120:
+        raise UsageError(f"--speed {speed:g}", "10 to 120 km/h", "choose one of these")
+    return replace(RigCar(), speed=speed / 3.6)
+
+
+def who_drives(driver: str, given: str) -> TwoPointDriver:
+    """A driver by name, or of a file.
+
+    Raises:
+        UsageError: there is none, the file is wrong, or does not tell all of him.
+    """
+    from codriver.errors import UsageError
+    from codriver.models.two_point_file import load_two_point, named
+    from codriver.simulate.circuit_drivers import CIRCUIT_DRIVERS, circuit_driver
+
+    take = [named(word.strip()) for word in given.split(",") if word.strip()]
+    if Path(driver).suffix == ".toml" and driver not in CIRCUIT_DRIVERS:
+        return load_two_point(driver).driver(take)
+    if take:
+        raise UsageError(f"--given {given} for {driver}", "a driver file", "leave it out: his parameters are all known")
+    return circuit_driver(driver)

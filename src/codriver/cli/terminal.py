@@ -22,8 +22,8 @@ def command_line() -> str:
 
 
 @contextmanager
-def working(show: bool, stages: int) -> Iterator[Callable[[str], None]]:
-    """A bar of so many stages, on standard error; call what it gives with each stage's name as the stage begins."""
+def working(show: bool, stages: int | None) -> Iterator[Callable[[str], None]]:
+    """A bar of so many stages (None: not known) on standard error; call what it gives with a stage's name as that begins."""
     if not show or not sys.stderr.isatty():
         yield lambda text: None
         return

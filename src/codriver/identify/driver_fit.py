@@ -1,8 +1,9 @@
-"""The parameters of a two-point driver from a drive, with standard errors, and refusals by name.
+"""The parameters of a two-point driver from drives, with standard errors, and refusals by name.
 
     by "road"       the road as instrument (`driver_road`): for drivers who vary, as people do
     by "direct"     prediction errors, the least squares of `driver_search`: sharper, and right only for a driver who is always the
                     same (Ljung, System Identification, 2nd ed. 1999, chapter 13, on direct identification in closed loop)
+    by "dual-ekf"   tick by tick (`driver_dual_ekf`), as Okamoto, Tsiotras 2019, section 5.3: for comparison
 
 What is known of drivers before the drive counts as one more observation: each parameter's logarithm is normal about the known
 driver's with SPREAD, a factor of 1.6 either way. So a parameter that the drive hardly tells is not held at a value that may be
@@ -11,30 +12,34 @@ wrong: its doubt is in the intervals of all others. Intervals are even in the lo
 Refused by name is a parameter of a combination that does not show in T at one speed, as K_r with K_p, K_c and K_t, and one whose
 standard error the drive has not brought below TOLD of what it was before, or that is STRANGE spreads from what was known without
 being SHARP: gains that drift by a tenth and more pull K_t down by the road, since K_r v d is nearly all of the torque of a steady
-curve.
+curve. Several drives count together, each at a speed of its own; at two speeds K_r shows.
 
 Measured on the circuit, 8 laps, 5 drivers, 3 seeds each, known = the default driver: see docs/two-point.md.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from codriver.errors import LogError, UsageError
 from codriver.identify.brake_fit import Refusal
+from codriver.identify.driver_dual_ekf import DualFit, DualTuning, dual_ekf
 from codriver.identify.driver_record import DriverRecord, driver_record
 from codriver.identify.driver_residual import driver_of, jacobian, residual_of, thinning
-from codriver.identify.driver_result import LETTERS, DriverFit, DriverParameter
+from codriver.identify.driver_result import DriverFit, DriverParameter
 from codriver.identify.driver_road import by_the_road
 from codriver.identify.driver_search import Found, search
 from codriver.models.two_point import TwoPointDriver
+from codriver.models.two_point_file import LETTERS
 from codriver.signals import Log
 from codriver.signals.signal import Array
 
 ASKED = ("anticipation", "compensation", "lead", "lag", "delay", "reflex", "muscle")
-WAYS = ("road", "direct")
+SEEN = ("near", "far")  # where he looks: given, never sought
+WAYS = ("road", "direct", "dual-ekf")
+TWO_SPEEDS = 1.1  # ratio
 SPREAD = 0.5
 TOLD = 0.6
 STRANGE, SHARP = 2.0, 0.2  # spreads from what was known, with this share of doubt left
@@ -43,47 +48,93 @@ HIDDEN = 1e-6  # a singular value of the scaled Jacobian below this share of the
 
 
 def identify_driver(
-    log: Log,
+    drives: Log | Sequence[Log],
     known: TwoPointDriver | None = None,
     *,
-    asked: Sequence[str] = ASKED,
+    asked: Sequence[str] | None = None,
+    held: Collection[str] = (),
     by: str = "road",
     spread: float = SPREAD,
 ) -> DriverFit:
     """Identify a driver.
 
     Args:
-        log: a drive at one speed, see `driver_record`.
+        drives: one or several, each at one speed, see `driver_record`.
         known: where the two points are, the parameters that are not asked for, and what is known of the others. K_r is among the
             former: K_p and K_c are those for this K_r.
-        asked: names of the parameters to identify.
-        by: "road" or "direct".
+        asked: names of the parameters to identify; None for all of ASKED, and K_r where the drives' speeds differ by a tenth.
+        held: names of the parameters that None leaves out, since they are known.
+        by: "road", "direct" or "dual-ekf"; the last takes one drive.
         spread: standard deviation of the logarithms of the parameters asked for about those known.
 
     Raises:
-        MissingSignal, LogError: see `driver_record`; or nothing happens in the drive.
-        UsageError: a name is no parameter, or is asked for twice; there is no such way; the spread is not positive.
+        MissingSignal, LogError: see `driver_record`; or nothing happens in a drive, or the dual filter diverges.
+        UsageError: a name is no parameter, or is asked for twice; there is no such way; the spread is not positive; no drive, or
+            too many.
     """
     known = known or TwoPointDriver()
+    logs = [drives] if isinstance(drives, Log) else list(drives)
     if by not in WAYS or not spread > 0:
         raise UsageError(
             f"by '{by}', spread {spread:g}", f"one of {', '.join(WAYS)}, and a positive spread", "choose one"
         )
-    if not asked or len(set(asked)) < len(asked) or any(n not in LETTERS for n in asked):
+    seekable = [n for n in LETTERS if n not in SEEN]
+    if asked is not None and (not asked or len(set(asked)) < len(asked) or any(n not in seekable for n in asked)):
         raise UsageError(
-            f"asked for {', '.join(asked) or 'nothing'}", f"some of {', '.join(LETTERS)}, each once", "choose among these"
+            f"asked for {', '.join(asked) or 'nothing'}", f"some of {', '.join(seekable)}, each once", "choose among these"
         )  # fmt: skip
-    record = driver_record(log, known.near, known.far)
-    _refuse_rest(record)
-    hidden = _hidden(record, known, tuple(asked))
+    if not logs or (by == "dual-ekf" and len(logs) > 1):
+        raise UsageError(f"{len(logs)} drives", "one drive" + (" or several" if by != "dual-ekf" else ""), "say which")
+    records = tuple(driver_record(log, known.near, known.far) for log in logs)
+    for record in records:
+        _refuse_rest(record)
+    if asked is None:
+        asked = [n for n in (*ASKED, *_at_two_speeds(records)) if n not in held]
+        if not asked:
+            raise UsageError("every parameter is held", f"some of {', '.join(ASKED)} to be sought", "hold fewer")
+    hidden = _hidden(records, known, tuple(asked))
     names = tuple(n for n in asked if n not in hidden)
-    refused = [Refusal(n, _together(n, hidden)) for n in asked if n in hidden]
-    if not names:
-        return _result(record, known, names, None, refused, tuple(asked), by, spread)
-    residual = residual_of(record, known, names)
-    instrument = residual_of(by_the_road(record), known, names) if by == "road" else residual
-    end = search(residual, instrument, _logarithms(known, names), spread)
-    return _result(record, known, names, end, refused, tuple(asked), by, spread)
+    end, path = None, None
+    if names and by == "dual-ekf":
+        end, path = _by_filter(records[0], known, names, spread)
+    elif names:
+        residual = residual_of(records, known, names)
+        instrument = residual_of([by_the_road(r) for r in records], known, names) if by == "road" else residual
+        end = search(residual, instrument, _logarithms(known, names), spread)
+    parameters, refused = _judged(known, names, end, spread)
+    refused = (*(Refusal(n, _together(n, hidden, len(logs))) for n in asked if n in hidden), *refused)
+    best = known if end is None else driver_of(known, names, end.theta)
+    rms, explained = _left(records, best)
+    return DriverFit(
+        parameters, refused, {n: float(getattr(known, n)) for n in LETTERS if n not in asked}, known,
+        np.zeros((0, 0)) if end is None else _correlation(end), names, by, end is None or end.settled, best, rms, explained,
+        float("nan") if end is None else float(np.sqrt(np.mean(end.errors**2))),
+        path.tick if path is not None else thinning(records[0].dt) * records[0].dt, end,
+        float(sum((r.last - r.first) * r.dt for r in records)), tuple(r.speed for r in records), records, path,
+        tuple(log["driver_torque"].source for log in logs if log["driver_torque"].source.startswith("estimate")),
+    )  # fmt: skip
+
+
+def _by_filter(
+    record: DriverRecord, known: TwoPointDriver, names: tuple[str, ...], spread: float
+) -> tuple[Found, DualFit]:
+    """The dual filter's end as that of a search, and its path."""
+    path = dual_ekf(record, known, names, DualTuning(spread=spread))
+    variance = path.covariance.diagonal()
+    if not (np.isfinite(path.values).all() and (variance > 0).all()):
+        raise LogError(
+            f"{record.source}: the dual filter diverges", "a filter that stays finite", "identify by the road"
+        )
+    late = np.log(path.values[-path.time.size // 5 :])
+    settled = bool((np.ptp(late, axis=0) < np.sqrt(variance)).all())
+    pieces = np.array([0, path.errors.size])
+    return Found(np.log(path.values[-1]), settled, path.covariance, path.covariance, path.errors, pieces), path
+
+
+def _at_two_speeds(records: Sequence[DriverRecord]) -> tuple[str, ...]:
+    """What only drives at two speeds tell."""
+    speeds = [r.speed for r in records]
+    return ("column_gain",) if max(speeds) > TWO_SPEEDS * min(speeds) else ()
 
 
 def _logarithms(known: TwoPointDriver, names: tuple[str, ...]) -> Array:
@@ -93,18 +144,18 @@ def _logarithms(known: TwoPointDriver, names: tuple[str, ...]) -> Array:
 def _refuse_rest(record: DriverRecord) -> None:
     """A drive in which nothing happens tells nothing."""
     rows = slice(record.first, record.last)
-    seen, torque = float(np.std(record.far[rows])), float(np.std(record.torque[rows]))
-    if float(np.std(record.curvature[rows])) < 1e-5 or torque < 1e-3:
+    bent, torque = float(np.std(record.curvature[rows])), float(np.std(record.torque[rows]))
+    if bent < 1e-5 or torque < 1e-3:
         raise LogError(
-            f"{record.source}: a far point that moves by {seen:.2g} rad and a torque that changes by {torque:.2g} N m (sd)",
+            f"{record.source}: a curvature that changes by {bent:.2g} 1/m and a torque that changes by {torque:.2g} N m (sd)",
             "a drive with curves, and a torque that was measured or estimated",
             "record such a drive",
         )
 
 
-def _hidden(record: DriverRecord, known: TwoPointDriver, names: tuple[str, ...]) -> set[str]:
-    """Parameters of the combinations that do not show in the torque of this drive."""
-    J = jacobian(residual_of(record, known, names), _logarithms(known, names))
+def _hidden(records: Sequence[DriverRecord], known: TwoPointDriver, names: tuple[str, ...]) -> set[str]:
+    """Parameters of the combinations that do not show in the torque of these drives."""
+    J = np.concatenate(jacobian(residual_of(records, known, names), _logarithms(known, names)))
     scale = np.linalg.norm(J, axis=0)
     silent = {n for n, s in zip(names, scale, strict=True) if s < 1e-9 * scale.max()}
     shown = [k for k, n in enumerate(names) if n not in silent]
@@ -114,11 +165,29 @@ def _hidden(record: DriverRecord, known: TwoPointDriver, names: tuple[str, ...])
     }
 
 
-def _together(name: str, hidden: set[str]) -> str:
+def _left(records: Sequence[DriverRecord], best: TwoPointDriver) -> tuple[float, float]:
+    """RMS of the torque that a driver's model leaves unexplained, about its mean in each drive, and the share that it explains."""
+    left = whole = rows = 0.0
+    for r in records:
+        use = slice(r.first, r.last)
+        torque = r.torque[use]
+        off = torque - best.torque(r.near, r.far, r.angle, r.speed, r.dt)[use]
+        left, whole, rows = left + torque.size * off.var(), whole + torque.size * torque.var(), rows + torque.size
+    return float(np.sqrt(left / rows)), float(1 - left / whole)
+
+
+def _correlation(end: Found) -> Array:
+    sd = np.sqrt(end.robust.diagonal())
+    return np.asarray(end.robust / np.outer(sd, sd))
+
+
+def _together(name: str, hidden: set[str], drives: int) -> str:
     others = ", ".join(sorted(hidden - {name}))
     if not others:
         return "it does not show in the torque"
-    return f"only a combination of it with {others} shows in the torque at one speed"
+    return f"only a combination of it with {others} shows in the torque at one speed" + (
+        "" if drives == 1 else ", and these drives are at one"
+    )
 
 
 def _vague(names: tuple[str, ...], k: int, sd: float, spread: float, correlation: Array) -> str:
@@ -131,35 +200,26 @@ def _vague(names: tuple[str, ...], k: int, sd: float, spread: float, correlation
     return f"{said}; confused with {names[rival]} (correlation {correlation[k, rival]:.2f})"
 
 
-def _result(
-    record: DriverRecord, known: TwoPointDriver, names: tuple[str, ...], end: Found | None, refused: list[Refusal],
-    asked: tuple[str, ...], by: str, spread: float,
-) -> DriverFit:  # fmt: skip
-    """Parameters with intervals, refusals, and how well it fits."""
+def _judged(
+    known: TwoPointDriver, names: tuple[str, ...], end: Found | None, spread: float
+) -> tuple[dict[str, DriverParameter], tuple[Refusal, ...]]:
+    """Parameters with intervals, and those that the drives do not tell."""
+    if end is None:
+        return {}, ()
     parameters: dict[str, DriverParameter] = {}
-    best, correlation, one_step = known, np.zeros((0, 0)), float("nan")
-    if end is not None:
-        best, sd = driver_of(known, names, end.theta), np.sqrt(np.stack([end.plain.diagonal(), end.robust.diagonal()]))
-        correlation = end.robust / np.outer(sd[1], sd[1])
-        one_step = float(np.sqrt(np.mean(end.errors**2)))
-        for k, name in enumerate(names):
-            value, wide = float(np.exp(end.theta[k])), float(sd[:, k].max())
-            off = abs(float(end.theta[k] - _logarithms(known, names)[k])) / spread
-            if wide > TOLD * spread:
-                refused = [*refused, Refusal(name, _vague(names, k, wide, spread, correlation))]
-                continue
-            if off > STRANGE and wide > SHARP * spread:
-                said = f"{value:.3g} {LETTERS[name][1]} is {off:.1f} spreads from what was known, and not sharp"
-                refused = [*refused, Refusal(name, f"{said}: gains that drift do so")]
-                continue
+    refused: list[Refusal] = []
+    sd = np.sqrt(np.stack([end.plain.diagonal(), end.robust.diagonal()]))
+    for k, name in enumerate(names):
+        value, wide = float(np.exp(end.theta[k])), float(sd[:, k].max())
+        off = abs(float(end.theta[k] - _logarithms(known, names)[k])) / spread
+        letter, unit = LETTERS[name]
+        if wide > TOLD * spread:
+            refused.append(Refusal(name, _vague(names, k, wide, spread, _correlation(end))))
+        elif off > STRANGE and wide > SHARP * spread:
+            said = f"{value:.3g} {unit} is {off:.1f} spreads from what was known, and not sharp"
+            refused.append(Refusal(name, f"{said}: gains that drift do so"))
+        else:
             low, high = (value * np.exp([-1.96 * wide, 1.96 * wide])).tolist()
             plain, robust = (value * sd[:, k]).tolist()
-            parameters[name] = DriverParameter(name, *LETTERS[name], value, value * wide, plain, robust, low, high)
-    rows = slice(record.first, record.last)
-    torque = record.torque[rows]
-    left = torque - best.torque(record.near, record.far, record.angle, record.speed, record.dt)[rows]
-    return DriverFit(
-        parameters, tuple(refused), {n: getattr(known, n) for n in (*LETTERS, "near", "far") if n not in asked}, correlation,
-        names, by, end is None or end.settled, best, float(left.std()), float(1 - left.var() / torque.var()), one_step,
-        thinning(record.dt) * record.dt, torque.size * record.dt, record.speed, record,
-    )  # fmt: skip
+            parameters[name] = DriverParameter(name, letter, unit, value, value * wide, plain, robust, low, high)
+    return parameters, tuple(refused)

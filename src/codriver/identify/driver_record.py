@@ -10,13 +10,14 @@ third order at SLOW Hz, which changes nothing in a linear model whose parameters
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from codriver.errors import LogError, MissingSignal
 from codriver.models.road_sight import PathAhead, path_errors
-from codriver.signals import Log
+from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
 
 NEEDED = ("steering_wheel_angle", "driver_torque", "longitudinal_speed", "road_curvature")
@@ -81,8 +82,9 @@ def driver_record(log: Log, near: float, far: float) -> DriverRecord:
             f"{', '.join(NEEDED)}, and {' and '.join(WHERE)} or {' and '.join(MOTION)}",
             "map them in a names file; estimate driver_torque and sideslip_angle where no sensor has them",
         )
-    time, dt = _ticks(log, used, name)
-    values = {n: np.interp(time, log[n].time, log[n].values) for n in used}
+    known = {n: _known(log[n], name) for n in used}
+    time, dt = _ticks({n: t for n, (t, _) in known.items()}, log["driver_torque"].rate, name)
+    values = {n: np.interp(time, *known[n]) for n in used}
     v = values["longitudinal_speed"]
     speed = float(v.mean())
     if v.min() < LEAST_SPEED or v.std() > MOST_SPREAD * speed:
@@ -114,20 +116,27 @@ def driver_record(log: Log, near: float, far: float) -> DriverRecord:
     return DriverRecord(near_angle, far_angle, angle, torque, bent, speed, dt, first, last, summed, name)
 
 
-def _ticks(log: Log, used: tuple[str, ...], name: str) -> tuple[Array, float]:
+def _known(signal: Signal, name: str) -> tuple[Array, Array]:
+    """Stamps and values of the samples that are numbers."""
+    there = np.isfinite(signal.values)
+    if np.count_nonzero(there) < 2:
+        raise LogError(f"{name}: {signal.name} has no values", "a signal with numbers", "check how it was recorded")
+    return signal.time[there], np.asarray(signal.values[there], float)
+
+
+def _ticks(stamps: Mapping[str, Array], rate: float, name: str) -> tuple[Array, float]:
     """Ticks of the torque's rate over the stretch that all signals cover."""
     from itertools import starmap
 
-    torque = log["driver_torque"]
-    rate = min(torque.rate, FASTEST_RATE)
-    start, end = max(log[n].time[0] for n in used), min(log[n].time[-1] for n in used)
+    rate = min(rate, FASTEST_RATE)
+    start, end = max(t[0] for t in stamps.values()), min(t[-1] for t in stamps.values())
     if end - start < LEAST_SECONDS or rate < SLOWEST_RATE:
         raise LogError(
             f"{name}: {max(end - start, 0):.0f} s of all signals, torque at {rate:.3g} Hz",
             f"at least {LEAST_SECONDS:g} s at {SLOWEST_RATE:g} Hz: a driver's delay is 0.1 s",
             "record a longer drive, and faster",
         )
-    holes = {n: float(np.diff(log[n].time).max()) for n in used}
+    holes = {n: float(np.diff(t[(t >= start) & (t <= end)]).max(initial=0.0)) for n, t in stamps.items()}
     if max(holes.values()) > LONGEST_HOLE:
         said = ", ".join(starmap("{} {:.1f} s".format, [h for h in holes.items() if h[1] > LONGEST_HOLE]))
         raise LogError(

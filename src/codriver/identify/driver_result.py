@@ -7,15 +7,14 @@ from dataclasses import dataclass, field, replace
 
 from codriver.errors import LogError
 from codriver.identify.brake_fit import Refusal
+from codriver.identify.driver_dual_ekf import DualFit
 from codriver.identify.driver_record import DriverRecord
+from codriver.identify.driver_search import Found
 from codriver.models.two_point import TwoPointDriver
+from codriver.models.two_point_file import LETTERS, FiledDriver, FiledParameter
 from codriver.signals.signal import Array
 
-# Attribute of TwoPointDriver: letter, unit.
-LETTERS = {
-    "anticipation": ("K_p", "1"), "compensation": ("K_c", "m/s"), "lead": ("T_L", "s"), "lag": ("T_I", "s"),
-    "delay": ("tau_p", "s"), "column_gain": ("K_r", "N*s/rad"), "reflex": ("K_t", "N*m/rad"), "muscle": ("T_N", "s"),
-}  # fmt: skip
+WORDS = {"road": "the road", "direct": "prediction errors", "dual-ekf": "dual EKF"}
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,8 @@ class DriverParameter:
         name, letter, unit: as in TwoPointDriver; SI.
         value: in `unit`.
         sd: standard error, the larger of the two; what was known before the drive counts.
-        sd_model: if the residuals are white; `sd_robust` if they are alike from tick to tick (Newey-West).
+        sd_model: if the residuals are white; `sd_robust` if they are alike from tick to tick (Newey-West). Of the dual filter
+            both are its own, which hold what its tuning assumes.
         low, high: 95 % interval, even in the parameter's logarithm.
     """
 
@@ -49,18 +49,25 @@ class DriverFit:
         parameters: by name, those that the drive tells.
         refused: the others that were asked for, and why.
         given: parameters that were not asked for, as they were taken.
+        known: what was given before the drive.
         correlation: of the estimates of `names`, shape (p, p); names: those that were sought.
-        by: "road" or "direct"; settled: the search ended by itself.
+        by: "road", "direct" or "dual-ekf".
+        settled: the search ended by itself; of the dual filter: no parameter moved by more than its standard deviation in the last
+            fifth of the drive.
         best: the driver at the end of the search.
         rms: of the torque that the model does not explain, N m; `explained`: share of the torque's variance that it does.
         one_step: rms of the error one tick of `tick` s ahead, N m.
-        seconds, speed: of the drive that counts, s, m/s.
-        record: what was fitted.
+        found: the search's end: errors one tick ahead, covariances; None if nothing was sought.
+        seconds: of the drives that count; speeds: of each, m/s.
+        records: what was fitted.
+        path: the parameters over time by the dual filter; None otherwise.
+        estimated: sources of torques that are no sensor's, by drive.
     """
 
     parameters: Mapping[str, DriverParameter]
     refused: tuple[Refusal, ...]
     given: Mapping[str, float]
+    known: TwoPointDriver
     correlation: Array = field(repr=False)
     names: tuple[str, ...]
     by: str
@@ -70,9 +77,17 @@ class DriverFit:
     explained: float
     one_step: float
     tick: float
+    found: Found | None = field(repr=False)
     seconds: float
-    speed: float
-    record: DriverRecord = field(repr=False)
+    speeds: tuple[float, ...]
+    records: tuple[DriverRecord, ...] = field(repr=False)
+    path: DualFit | None = field(repr=False)
+    estimated: tuple[str, ...] = ()
+
+    @property
+    def source(self) -> str:
+        """The drives."""
+        return ", ".join(r.source for r in self.records)
 
     def driver(self) -> TwoPointDriver:
         """The driver found.
@@ -82,16 +97,32 @@ class DriverFit:
         """
         if self.refused:
             raise LogError(
-                f"{self.record.source}: " + "; ".join(f"{r.name}: {r.reason}" for r in self.refused),
+                f"{self.source}: " + "; ".join(f"{r.name}: {r.reason}" for r in self.refused),
                 "a drive that tells all parameters asked for",
                 "record a longer drive with more curves, or leave these parameters out of `asked`: they are then those of `known`",
             )
         return replace(self.best)
 
-    def torque(self) -> Array:
-        """The torque of the driver found on this drive, from what he saw, N m, shape (n,)."""
-        r = self.record
+    def torque(self, drive: int = 0) -> Array:
+        """The torque of the driver found on a drive, from what he saw, N m, shape (n,)."""
+        r = self.records[drive]
         return self.best.torque(r.near, r.far, r.angle, r.speed, r.dt)
+
+    def filed(self, name: str) -> FiledDriver:
+        """The driver as a file holds him: told, given, or not told and why.
+
+        Args:
+            name: whose.
+        """
+        told = {p.name: FiledParameter(p.value, p.sd, source="identified") for p in self.parameters.values()}
+        why = {r.name: f"not told: {r.reason}" for r in self.refused}
+        made = {
+            n: told.get(n)
+            or (FiledParameter(None, given=float(getattr(self.known, n)), source=why[n]) if n in why
+                else FiledParameter(self.given[n], source="given"))
+            for n in LETTERS
+        }  # fmt: skip
+        return FiledDriver(name, f"identified from {self.source}, by {WORDS[self.by]}", made)
 
     def table(self) -> list[tuple[str, str, str, float, float, float, float]]:
         """Rows of name, letter, unit, value, sd, low, high."""

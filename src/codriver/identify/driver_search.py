@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from codriver.identify.driver_residual import Residual, jacobian, whitened, whitening
-from codriver.identify.standard_errors import block_length, newey_west
+from codriver.identify.standard_errors import Index, block_length, newey_west
 from codriver.signals.signal import Array
 
 _ROUNDS, _STEPS, _TRIES = 20, 6, 8
@@ -36,7 +36,8 @@ class Found:
         theta: logarithms.
         settled: the rounds ended by themselves.
         plain, robust: covariances of theta, for white errors and for such that are alike over time.
-        errors: e.
+        errors: e, one drive after the other.
+        pieces: first rows of the drives in it, and its length.
     """
 
     theta: Array
@@ -44,6 +45,7 @@ class Found:
     plain: Array
     robust: Array
     errors: Array
+    pieces: Index
 
 
 def search(residual: Residual, instrument: Residual, start: Array, spread: float) -> Found:
@@ -58,13 +60,18 @@ def search(residual: Residual, instrument: Residual, start: Array, spread: float
     theta = start
     for _ in range(_ROUNDS):
         filter_ = whitening(residual(theta))
-        Z, e = whitened(filter_, jacobian(instrument, theta)), whitened(filter_, residual(theta))
-        before, theta = theta, _round(residual, filter_, Z, _meat(Z, e), theta, start, spread)
+        v = residual(theta)
+        Z, e, pieces = (
+            whitened(filter_, jacobian(instrument, theta)),
+            whitened(filter_, v),
+            _pieces(v, filter_.size - 1),
+        )
+        before, theta = theta, _round(residual, filter_, Z, _meat(Z, e, pieces), theta, start, spread)
         plain, robust, errors = _covariances(residual, instrument, theta, spread)
         settled = bool((np.abs(theta - before) < _SETTLED * np.sqrt(robust.diagonal())).all())
         if settled:
             break
-    return Found(theta, settled, plain, robust, errors)
+    return Found(theta, settled, plain, robust, errors, pieces)
 
 
 def _round(residual: Residual, filter_: Array, Z: Array, S: Array, theta: Array, known: Array, spread: float) -> Array:
@@ -94,21 +101,27 @@ def _round(residual: Residual, filter_: Array, Z: Array, S: Array, theta: Array,
     return theta
 
 
-def _meat(Z: Array, e: Array) -> Array:
+def _pieces(drives: tuple[Array, ...], p: int) -> Index:
+    """First rows of the drives in e, and its length."""
+    return np.cumsum([0, *(v.size - p for v in drives)])
+
+
+def _meat(Z: Array, e: Array, pieces: Index) -> Array:
     """Newey-West's covariance of Z'e."""
-    used, pieces = np.ones(e.size, bool), np.array([0, e.size])
+    used = np.ones(e.size, bool)
     ZZ = Z.T @ Z
     return np.asarray(ZZ @ newey_west(Z, e, used, pieces, block_length(Z, e, used, pieces)) @ ZZ)
 
 
 def _covariances(residual: Residual, instrument: Residual, theta: Array, spread: float) -> tuple[Array, Array, Array]:
     """Plain and robust covariance at theta, and e."""
-    filter_ = whitening(residual(theta))
+    v = residual(theta)
+    filter_ = whitening(v)
     Z, J = (whitened(filter_, jacobian(r, theta)) for r in (instrument, residual))
-    e = whitened(filter_, residual(theta))
+    e, pieces = whitened(filter_, v), _pieces(v, filter_.size - 1)
     G, before = Z.T @ J, np.eye(theta.size) / spread**2
     plain, robust = (
         np.asarray(np.linalg.inv(G.T @ np.linalg.solve(S, G) + before), float)
-        for S in (Z.T @ Z * (e @ e) / e.size, _meat(Z, e))
+        for S in (Z.T @ Z * (e @ e) / e.size, _meat(Z, e, pieces))
     )
     return plain, robust, e

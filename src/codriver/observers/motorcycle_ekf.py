@@ -17,8 +17,8 @@ turn is taken as balanced, no pitch rate as zero.
 **Tick.** x+ = x + (dt + A dt^2/2 + ...) f(x), F = 1 + A dt + A^2 dt^2/2 + ... with A at the last estimate, as many terms as the
 tick needs up to the greatest speed. Rows one at a time, where fresh. v and v' come from the speed by `track_speed`.
 
-**Start** at the first tick that has everything, at sin phi = (f_y - v r) / g: exact in a steady turn at any lean, and at rest. A
-gap of `GAP` s, or a roll beyond `STEEPEST`, starts it anew.
+**Start** once everything needed came within `STALE` s, at sin phi = (f_y - v r) / g: exact in a steady turn at any lean, and at
+rest. A gap of `GAP` s, or a roll beyond `STEEPEST`, starts it anew.
 
 **Noise.** What a sensor's samples scatter by is learnt from their second differences (`learn_scatter`), beside a floor for what
 the model leaves out. The model's own noise is `EkfNoise`; its defaults were chosen so that bands cover machines that are told wrong
@@ -40,6 +40,7 @@ import numpy as np
 from codriver.kernel import Scalar, both, negate, select, sqrt
 from codriver.models.motorcycle_lean import LEAN_STATES, LeanParameters, lean_functions
 from codriver.names import quantity
+from codriver.observers.arrivals import all_came, arrivals_carry, note_arrivals
 from codriver.observers.augmented_kalman import Moments, carried, pack, unpack
 from codriver.observers.covariance import Matrix, update_row
 from codriver.observers.observer import Observer, Output, Scalars
@@ -67,7 +68,7 @@ PITCH_TIME, MOMENT_TIME, TILT_TIME, HEAVE_TIME = 0.2, 0.5, 0.5, 0.2  # s
 RATE = 100.0  # Hz, at which the floors of the rows are told
 TILTED = {"roll_rate": TURN, "yaw_rate": LEANING}  # rows that see another rate where the machine is pitched
 TRACKING, SCATTER_TIME = 4.0, 2.0  # rad/s, s
-GAP, STALE = 1.0, 0.1  # s
+GAP, STALE = 1.0, 0.25  # s
 SLOW = (2.0, 4.0)  # m/s: all of it below the first, none above the second
 STEEPEST, SURE = 1.35, 3 * DEGREE
 CLOSE, TERMS = 1e-3, 12
@@ -149,10 +150,8 @@ def motorcycle_ekf(
     Q, floors = noise.process(), noise.floors(dt)
 
     def step(carry: Scalars, u: Scalars, y: Scalars, ok: Scalars, rho: Scalars) -> tuple[Scalars, Scalars]:
-        there: Scalar = 1.0
-        for name in NEEDED:
-            there = both(there, ok[name])
-        begun, active = carry["begun"], select(carry["begun"], 1.0, there)
+        came = note_arrivals(carry, NEEDED, y, ok, dt)
+        begun, active = carry["begun"], select(carry["begun"], 1.0, all_came(came, NEEDED, STALE))
         track = track_speed(carry, y[SPEED], ok[SPEED], TRACKING, dt)
         scatter = learn_scatter(carry, IMU, y, ok, SCATTER_TIME, dt)
         v, dv = track["speed"], track["speed_rate"]
@@ -170,7 +169,7 @@ def motorcycle_ekf(
         spread = ca.SX(ca.DM(Q * dt))
         spread[MOMENT] += slowness * (noise.feet**2 * 2 / MOMENT_TIME * dt)
         moved, P = x + series(whole, rate, dt, terms), F @ P @ F.T + ca.diag(spread)
-        start = _start(p, y, ok, v)
+        start = _start(p, came, v)
         found = [select(begun, moved[i], start[i]) for i in range(N)]
         apart: Matrix = [[0.0 if i != j else START[i] ** 2 for j in range(N)] for i in range(N)]
         apart[MOMENT][MOMENT] += slowness * noise.feet**2
@@ -201,18 +200,17 @@ def motorcycle_ekf(
         sds = [
             select(active, sqrt(select(done.P[i][i] > 0, done.P[i][i], 0.0)), START[i]) for i in range(N)
         ]  # fmt: skip
-        gap = select(there, 0.0, carry["gap"] + dt)
         lean = select(estimate[ROLL] < 0, -estimate[ROLL], estimate[ROLL])
-        keep = both(active, both(gap < GAP, lean < STEEPEST))
+        keep = both(active, both(all_came(came, NEEDED, GAP), lean < STEEPEST))
         inside = both(track["speed_known"], both(v >= low, v <= high))
-        sure = both(both(gap < STALE, sds[ROLL] < SURE), both(inside, negate(slowness > 0)))
-        new = {**pack(Moments(estimate, done.P)), "begun": keep, "gap": gap, **track, **scatter}
+        sure = both(both(all_came(came, NEEDED, STALE), sds[ROLL] < SURE), both(inside, negate(slowness > 0)))
+        new = {**pack(Moments(estimate, done.P)), "begun": keep, **came, **track, **scatter}
         for name, value, sd in zip(STATES, estimate, sds, strict=True):
             out |= {name: value, f"{name}_sd": sd}
         flags = {"slow": slowness > 0, "speed_in_range": inside, "valid": both(keep, sure)}
         return {key: new[key] for key in begin}, out | flags
 
-    begin = {**carried(N), "begun": 0.0, "gap": 0.0, **SPEED_CARRY, **scatter_carry(SCATTER)}
+    begin = {**carried(N), "begun": 0.0, **arrivals_carry(NEEDED), **SPEED_CARRY, **scatter_carry(SCATTER)}
     return Observer(
         "motorcycle-ekf", dt, (), (*ROWS, SPEED), begin, _outputs(low, high), step, optional=OPTIONAL,
         settings={"low": low, "high": high, "terms": terms, "front_crown": p.front_crown, "rear_crown": p.rear_crown,
@@ -220,12 +218,12 @@ def motorcycle_ekf(
     )  # fmt: skip
 
 
-def _start(p: LeanParameters, y: Scalars, ok: Scalars, v: Scalar) -> list[Scalar]:
+def _start(p: LeanParameters, came: Scalars, v: Scalar) -> list[Scalar]:
     """The state at the first tick: a steady turn, or rest."""
     import casadi as ca
 
     q = p.sharp
-    given = {row: select(ok[row], y[row], 0.0) for row in ROWS}
+    given = {name: came[f"latest_{name}"] for name in NEEDED}
     lean = (given["lateral_acceleration"] - v * given["yaw_rate"]) / q.g
     held = select(lean > 0.95, 0.95, select(lean < -0.95, -0.95, lean))
     turn = given["yaw_rate"] / sqrt(1 - held * held)

@@ -36,6 +36,7 @@ from codriver.vehicles import Vehicle
 FAMILY = "motorcycle"
 PARAMETERS = tuple(LETTERS.values())
 BALANCED = ("steer_angle", "roll_rate", "yaw_rate", "longitudinal_speed")
+CHAINED = ("longitudinal_speed", "yaw_rate", "steer_angle", "roll_rate")  # the same, as the parts of a chain want them
 RANGE = (8.0, 45.0)  # m/s, of the observers by LMI and of the unknown input
 WINDOW = 0.04  # s, of the differentiator in front of them
 
@@ -105,21 +106,22 @@ def on_the_road(observer: Observer) -> Observer:
 register(Estimator(
     "motorcycle-ekf", PARAMETERS, NEEDED,
     "roll, tyre forces and rider's torque at any lean, from the IMU's raw signals, steer angle and speed; finds biases", FAMILY,
-    _ekf, forms=("kalman",),
+    _ekf, forms=("kalman",), varies=False,
 ))  # fmt: skip
 register(Estimator(
     "motorcycle-kalman", PARAMETERS, BALANCED,
     "roll, tyre forces and rider's torque on the linear model, from steer angle, gyroscope and speed", FAMILY, _kalman,
+    varies=False,
 ))  # fmt: skip
 register(Estimator(
-    "motorcycle-ts", PARAMETERS, BALANCED,
-    "roll, tyre forces and rider's torque by the 2018 paper's observer, no bands", FAMILY, _ts, forms=("kalman",),
+    "motorcycle-ts", PARAMETERS, CHAINED,
+    "roll, tyre forces and rider's torque by the 2018 paper's observer, no bands", FAMILY, _ts, forms=("kalman",), varies=False,
 ))  # fmt: skip
 register(Estimator(
-    "motorcycle-uio", PARAMETERS, BALANCED,
-    "roll, tyre forces and rider's torque by an unknown-input observer, no bands", FAMILY, _uio, forms=("kalman",),
+    "motorcycle-uio", PARAMETERS, CHAINED,
+    "roll, tyre forces and rider's torque by an unknown-input observer, no bands", FAMILY, _uio, forms=("kalman",), varies=False,
 ))  # fmt: skip
 register(Estimator(
     "motorcycle-imu", (), (*BALANCED[1:],), "roll alone from gyroscope and speed, the usual baseline", FAMILY, _imu,
-    forms=("kalman",),
+    forms=("kalman",), varies=False,
 ))  # fmt: skip

@@ -22,11 +22,12 @@ from math import pi
 
 import numpy as np
 
-from codriver.kernel import both, either, minimum, negate, select, sqrt
+from codriver.kernel import both, either, negate, select, sqrt
 from codriver.models.motorcycle_lean import LeanParameters
 from codriver.models.road_frame import GRAVITY
 from codriver.models.road_frame import STEEPEST as STEEPEST_SINE
 from codriver.names import quantity
+from codriver.observers.arrivals import all_came, arrivals_carry, note_arrivals
 from codriver.observers.augmented_kalman import Moments, carried, pack, unpack
 from codriver.observers.covariance import predict_covariance, update_row
 from codriver.observers.observer import Observer, Output, Scalars
@@ -35,7 +36,7 @@ from codriver.observers.scaled_gain import check_tick
 SPEED = "longitudinal_speed"
 RATES = ("roll_rate", "yaw_rate")
 SLOWEST = 4.0  # m/s
-GAP, STALE = 1.0, 0.1  # s
+GAP, STALE = 1.0, 0.25  # s
 SURE = 5 * pi / 180
 STEEPEST = 1.5  # rad
 START = (0.3, 0.02)  # rad, rad/s
@@ -91,16 +92,16 @@ def motorcycle_imu(dt: float = 0.01, correction: float = 1.0, noise: ImuNoise | 
         import casadi as ca
 
         v = select(ok[SPEED], rho[SPEED], carry["speed"])
+        came = note_arrivals(carry, RATES, y, ok, dt)
         turning = both(ok["yaw_rate"], ok[SPEED])
-        there = both(turning, ok["roll_rate"])
+        there = both(ok[SPEED], all_came(came, RATES, STALE))
         begun, active = carry["begun"], select(carry["begun"], 1.0, there)
-        r = select(ok["yaw_rate"], y["yaw_rate"], 0.0)
+        p, r = came["latest_roll_rate"], came["latest_yaw_rate"]
         sine = correction * v * r * (-1 / GRAVITY)
         outside = either(sine > STEEPEST_SINE, sine < -STEEPEST_SINE)
         lean = ca.asin(select(sine > STEEPEST_SINE, STEEPEST_SINE, select(sine < -STEEPEST_SINE, -STEEPEST_SINE, sine)))
-        p = select(ok["roll_rate"], y["roll_rate"], carry["rate"])
         now = unpack(carry, 2)
-        moved = [now.x[0] + dt * (0.5 * (p + carry["rate"]) - now.x[1]), now.x[1]]
+        moved = [now.x[0] + dt * (0.5 * (p + carry["latest_roll_rate"]) - now.x[1]), now.x[1]]
         P = predict_covariance(now.P, F, Q)
         x = [select(begun, moved[0], lean), select(begun, moved[1], 0.0)]
         P = [[select(begun, P[i][j], START[i] ** 2 if i == j else 0.0) for j in range(2)] for i in range(2)]
@@ -109,19 +110,18 @@ def motorcycle_imu(dt: float = 0.01, correction: float = 1.0, noise: ImuNoise | 
         x, P, s = update_row(x, P, [1.0, 0.0], e, R, use)
         x = [select(a > b, b, select(a < -b, -b, a)) for a, b in zip(x, (STEEPEST, 0.5), strict=True)]
         x = [select(active, a, 0.0) for a in x]
-        gap = select(there, 0.0, minimum(carry["gap"] + dt, 2 * GAP))
-        keep = both(active, gap < GAP)
+        keep = both(active, all_came(came, RATES, GAP))
         sds = [sqrt(select(P[i][i] > 0, P[i][i], 0.0)) for i in range(2)]
         inside = both(ok[SPEED], both(v > SLOWEST, negate(outside)))
-        valid = both(both(keep, gap < STALE), both(inside, sds[0] < SURE))
+        valid = both(both(keep, there), both(inside, sds[0] < SURE))
         out = {
             "roll_angle": x[0], "roll_angle_sd": sds[0], "roll_rate_bias": x[1], "roll_rate_bias_sd": sds[1],
             "turn_innovation": e, "turn_innovation_sd": sqrt(s), "lean_in_range": negate(outside), "valid": valid,
         }  # fmt: skip
-        new = {**pack(Moments(x, P)), "rate": p, "speed": v, "begun": keep, "gap": gap}
+        new = {**pack(Moments(x, P)), **came, "speed": v, "begun": keep}
         return {key: new[key] for key in begin}, out
 
-    begin = {**carried(2), "rate": 0.0, "speed": 0.0, "begun": 0.0, "gap": 0.0}
+    begin = {**carried(2), **arrivals_carry(RATES), "speed": 0.0, "begun": 0.0}
     outputs = (
         Output("roll_angle", "rad", "estimate", quantity("roll_angle").meaning),
         Output("roll_angle_sd", "rad", "sd", "standard deviation of roll_angle"),

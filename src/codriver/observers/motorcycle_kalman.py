@@ -35,6 +35,7 @@ from codriver.models.lpv import LPV
 from codriver.models.road_frame import GRAVITY, by_turn
 from codriver.models.state_space import matrix_exponential
 from codriver.names import quantity
+from codriver.observers.arrivals import all_came, arrivals_carry, note_arrivals
 from codriver.observers.augmented_kalman import Moments, carried, pack, unpack
 from codriver.observers.covariance import Matrix, predict_covariance, predict_mean, update_row
 from codriver.observers.observer import Certificate, Observer, Output, Scalars
@@ -50,7 +51,7 @@ SENSED = ("steer_angle", "roll_rate", "yaw_rate")  # as the IMU has them
 ROWS = {"steer_angle": "rad", "roll_rate": "rad/s", "yaw_rate": "rad/s", "balance": "m/s^2"}  # of the model
 NODES, GRID = 9, 41
 CLOSE, TERMS = 1e-4, 14
-GAP, STALE, SETTLE = 1.0, 0.1, 2.0  # s
+GAP, STALE, SETTLE = 1.0, 0.25, 2.0  # s
 SCATTER, SCATTER_TIME = dict.fromkeys(SENSED[1:], 0.05), 2.0  # rad/s until learnt, s
 HOLD = 2.0  # T, s: over which the roll rate's bias adds up
 MOST = 1e5  # of any state, so that nonsense stays finite
@@ -227,12 +228,11 @@ def motorcycle_kalman(
         import casadi as ca
 
         v = select(ok[SPEED], rho[SPEED], carry["speed"])
-        there: Scalar = ok[SPEED]
-        for name in SENSED:
-            there = both(there, ok[name])
+        came = note_arrivals(carry, SENSED, y, ok, dt)
+        there = both(ok[SPEED], all_came(came, SENSED, STALE))
         begun, active = carry["begun"], select(carry["begun"], 1.0, there)
-        road = by_turn(v, select(ok["yaw_rate"], y["yaw_rate"], 0.0))
-        values = [*(select(ok[c], y[c], 0.0) for c in SENSED[:2]), road.yaw_rate, 0.0]
+        road = by_turn(v, came["latest_yaw_rate"])
+        values = [*(came[f"latest_{name}"] for name in SENSED[:2]), road.yaw_rate, 0.0]
         turning = both(ok["yaw_rate"], ok[SPEED])
         # The sample that it starts from is not taken twice.
         fresh = [both(begun, flag) for flag in (ok["steer_angle"], ok["roll_rate"], turning, turning)]
@@ -253,12 +253,12 @@ def motorcycle_kalman(
         learnt = learn_scatter(carry, SENSED[1:], y, ok, SCATTER_TIME, dt) if form == "kalman" else {}
         found, memory, variances, told = update({**carry, **learnt}, F, x, C, values, fresh, held)
         found = [select(active, select(a > MOST, MOST, select(a < -MOST, -MOST, a)), 0.0) for a in found]
-        gap = select(there, 0.0, minimum(carry["gap"] + dt, 2 * GAP))
-        keep = both(active, gap < GAP)
-        since = select(both(keep, gap < STALE), minimum(carry["since"] + dt, 2 * SETTLE), 0.0)
+        keep = both(active, both(carry["blind"] < GAP, all_came(came, SENSED, GAP)))
+        blind = select(ok[SPEED], 0.0, minimum(carry["blind"] + dt, 2 * GAP))
+        since = select(both(keep, there), minimum(carry["since"] + dt, 2 * SETTLE), 0.0)
         inside = both(ok[SPEED], both(v >= low, v <= high))
         states = {f"x_{i}": a for i, a in enumerate(found)}
-        new = {**states, **memory, **learnt, "speed": v, "begun": keep, "gap": gap, "since": since}
+        new = {**states, **memory, **learnt, **came, "speed": v, "begun": keep, "blind": blind, "since": since}
         told_roll, unseen = noise.share * found[0], (noise.bias / GRAVITY) * v
         variances[0] = variances[0] + told_roll * told_roll + unseen * unseen + (noise.bias * HOLD) ** 2
         out: Scalars = {}
@@ -270,7 +270,7 @@ def motorcycle_kalman(
         return {key: new[key] for key in begin}, out | flags
 
     own = {**carried(n), **scatter_carry(SCATTER)} if form == "kalman" else {f"x_{i}": 0.0 for i in range(n)}
-    begin = {**own, "speed": low, "begun": 0.0, "gap": 0.0, "since": 0.0}
+    begin = {**own, **arrivals_carry(SENSED), "speed": low, "begun": 0.0, "blind": 0.0, "since": 0.0}
     return Observer(
         "motorcycle-kalman", dt, (), SENSED, begin, _outputs(model, low, high), step, scheduling=(SPEED,),
         settings={"low": low, "high": high, "form": form, "terms": terms},

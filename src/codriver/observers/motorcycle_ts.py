@@ -23,8 +23,6 @@ Damon, Ichalal, Arioui 2018, eq. (21)-(23), (35).
 
 from __future__ import annotations
 
-from math import factorial
-
 import numpy as np
 
 from codriver.errors import DesignError
@@ -36,6 +34,7 @@ from codriver.signals.signal import Array
 
 EXACT = 1e-9  # of the transition, beside scipy's matrix exponential, at speeds to a quarter beyond the range
 PARTS, TERMS = 32, 20  # at most
+LARGEST = 1e6  # state, in the design's units: where nothing is certified it may grow, but not overflow
 SETTLED = 100.0  # an error falls to this fraction before `valid`
 
 
@@ -87,15 +86,17 @@ def motorcycle_ts_observer(design: MotorcycleLMI) -> Observer:
         driven = [_sum(L[i][j] * first[j] for j in range(p)) for i in range(n)]
         for part in range(parts):
             force = driven if part == 0 else [d + r * (part * h) for d, r in zip(driven, rising, strict=True)]
-            term = [a + b for a, b in zip(_times(M, x), force, strict=True)]
-            total = [a + t * h for a, t in zip(x, term, strict=True)]
+            # Each term with its own step, so that high powers of M do not overflow in single precision.
+            term = [(a + b) * h for a, b in zip(_times(M, x), force, strict=True)]
+            total = [a + t for a, t in zip(x, term, strict=True)]
             for k in range(2, terms + 1):
-                term = _times(M, term)
+                term = [a * (h / k) for a in _times(M, term)]
                 if k == 2:
-                    term = [a + b for a, b in zip(term, rising, strict=True)]
-                total = [a + t * (h**k / factorial(k)) for a, t in zip(total, term, strict=True)]
+                    term = [a + b * (h * h / 2) for a, b in zip(term, rising, strict=True)]
+                total = [a + t for a, t in zip(total, term, strict=True)]
             x = total
         inside = both(ok[speed], both(v >= low, v <= high))
+        x = [select(value > LARGEST, LARGEST, select(value < -LARGEST, -LARGEST, value)) for value in x]
         x = [select(begun, value, 0.0) for value in x]
         good = both(there, inside)
         since = select(good, minimum(carry["since"] + dt, 2 * settle), 0.0)

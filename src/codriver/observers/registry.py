@@ -60,6 +60,7 @@ class Estimator:
         learns: whether its noise is fitted to the record where no preset is given.
         forms: the forms it has.
         forbids: parameters of a vehicle that it is not for.
+        varies: whether the vehicle may change which signals it needs; where not, nothing is built to find out.
     """
 
     name: str
@@ -75,6 +76,7 @@ class Estimator:
     learns: bool = False
     forms: tuple[str, ...] = ("kalman", "constant")
     forbids: tuple[str, ...] = ()
+    varies: bool = True
 
 
 def register(estimator: Estimator) -> Estimator:
@@ -119,6 +121,7 @@ def needed_signals(name: str, vehicle: Vehicle | None) -> tuple[str, ...]:
     estimator = get_estimator(name)
     if (
         vehicle is None
+        or not estimator.varies
         or any(p not in vehicle for p in estimator.parameters)
         or any(p in vehicle for p in estimator.forbids)
     ):

@@ -6,6 +6,8 @@ extreme is lost.
 
 from __future__ import annotations
 
+from html import escape
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -25,18 +27,21 @@ _FONT = {"family": "system-ui, 'Segoe UI', Helvetica, Arial, sans-serif", "size"
 def chart_figure(chart: Chart) -> dict[str, Any]:
     """Traces, layout and height of a chart, as JSON holds it."""
     legend_rows = max((_legend_rows(plot, chart.half) for plot in chart.plots), default=1)
-    top = TOP + 18 * (legend_rows - 1)
-    height = top + BOTTOM + sum(p.height for p in chart.plots) + (GAP + top - TOP + 20) * (len(chart.plots) - 1)
-    inner = height - top - BOTTOM
-    words = any(not isinstance(c.x, np.ndarray) for plot in chart.plots for c in plot.curves)
+    # A legend of several rows stays below plotly's buttons.
+    top = TOP + (18 * legend_rows - 4 if legend_rows > 1 else 0)
+    words = _words(chart)
+    bottom = BOTTOM + 16 * max((text.count("<br>") for text in words.values()), default=0)
+    height = top + bottom + sum(p.height for p in chart.plots) + (GAP + top - TOP + 20) * (len(chart.plots) - 1)
+    inner = height - top - bottom
     layout: dict[str, Any] = {
-        "height": height, "margin": {"l": 64, "r": 58 if any(p.right_label for p in chart.plots) else 16, "t": top, "b": BOTTOM},
+        "height": height, "margin": {"l": 64, "r": 58 if any(p.right_label for p in chart.plots) else 16, "t": top, "b": bottom},
         "paper_bgcolor": "#ffffff", "plot_bgcolor": "#ffffff", "hovermode": "closest", "dragmode": "zoom", "font": _FONT,
         "shapes": [], "annotations": [], "barmode": "group",
         "xaxis": {
             "title": {"text": chart.x_label}, "gridcolor": "#e4e4e4", "zeroline": False, "showline": True,
             "linecolor": "#444444", "ticks": "outside", "side": "bottom", "exponentformat": "none",
-            **({"type": "log", "dtick": "D2"} if chart.log_x else {}), **({"type": "category"} if words else {}),
+            **({"type": "log", "dtick": "D2"} if chart.log_x else {}),
+            **({"type": "category", "tickvals": list(words), "ticktext": list(words.values()), "tickangle": 0} if words else {}),
         },
     }  # fmt: skip
     if not words and not chart.log_x:
@@ -67,6 +72,13 @@ def chart_figure(chart: Chart) -> dict[str, Any]:
             "showarrow": False, "font": {"color": _BOX, "size": 12}, "bgcolor": "rgba(255,255,255,0.75)",
         })  # fmt: skip
     return {"traces": traces, "layout": layout}
+
+
+def _words(chart: Chart) -> dict[str, str]:
+    """Words along x, in the order in which they come, and how they are shown: in lines that fit."""
+    found = {x: "" for plot in chart.plots for c in plot.curves if not isinstance(c.x, np.ndarray) for x in c.x}
+    fits = max((70 if chart.half else 150) // max(len(found), 1), 6)
+    return {x: "<br>".join(escape(line) for line in wrap(x, fits, break_long_words=False)) for x in found}
 
 
 def _legend_rows(plot: Plot, half: bool) -> int:

@@ -6,13 +6,16 @@
 
 As Okamoto, Tsiotras 2019 (Robotics and Autonomous Systems), fig. 1 and section 5.2, with this project's car and circuit instead of
 CarSim's. Anticipation is by the far point, or by a predictive plan (`predictive`) in its place. A driver may vary (`variability`).
-The car holds its angle's line between ticks exactly; the wheel takes SUBSTEPS a tick.
+The car holds its angle's line between ticks exactly; the wheel takes SUBSTEPS a tick. A motor may add its torque to the driver's
+(`shared_control`); he may want to be beside the path for a while (`detour`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +27,7 @@ from codriver.models.two_point import TwoPointDriver
 from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
 from codriver.simulate.circuit_way import DIRECTIONS, way_curvature, way_length
+from codriver.simulate.detour import Detour, wanted_offset
 from codriver.simulate.predictive import Plan, plan_law
 from codriver.simulate.rig import RigCar
 from codriver.simulate.steering import Wheel
@@ -33,6 +37,23 @@ ANTICIPATIONS = ("far-point", "mpc")
 SUBSTEPS = 2  # of the wheel, a tick
 WIDTH = 4.0  # m; a car further off has left the road
 _BEYOND = 100.0  # m of road seen past the end
+
+
+class Seen(NamedTuple):
+    """What is measured at a tick: angle and driver's torque by sensors, the rest as `CircuitDrive`."""
+
+    angle: float
+    torque: float
+    sideslip: float
+    yaw_rate: float
+    curvature: float
+    offset: float
+    heading: float
+
+
+Motor = Callable[
+    [int, Seen], float
+]  # tick and what is measured to the motor's torque on the column, N m, until the next
 
 
 @dataclass(frozen=True)
@@ -47,6 +68,7 @@ class CircuitSetting:
         dt: tick, s.
         resolution: of the encoder, rad.
         torque_noise: sd of the torque sensor's noise, N m.
+        detours: of the driver's own.
 
     Raises:
         UsageError: no such direction or anticipation, no lap, or a tick or a speed that is not positive.
@@ -63,6 +85,7 @@ class CircuitSetting:
     dt: float = 0.01
     resolution: float = 0.1 * pi / 180
     torque_noise: float = 0.02
+    detours: tuple[Detour, ...] = ()
 
     def __post_init__(self) -> None:
         for name, value, known in (
@@ -92,7 +115,7 @@ class CircuitDrive:
         seed: of variability and sensors.
         time: s.
         angle, rate, measured: of the wheel, true, and by the encoder, rad and rad/s.
-        driver_torque, measured_torque, alignment_torque: N m.
+        driver_torque, measured_torque, alignment_torque, motor_torque: N m.
         sideslip, yaw_rate, curvature, offset, heading: rad, rad/s, 1/m, m, rad.
         near, far: directions of the two points, rad, as they are, not as they are seen.
         variation: how the driver varied.
@@ -115,6 +138,7 @@ class CircuitDrive:
     near: Array
     far: Array
     variation: Variation
+    motor_torque: Array
 
     def log(self) -> Log:
         """What the simulator logs: angle and torque by sensors, the rest from its vehicle model and scene."""
@@ -128,6 +152,7 @@ class CircuitDrive:
             ("road_curvature", self.curvature, "1/m", "scene"),
             ("lateral_offset", self.offset, "m", "scene"),
             ("heading_error", self.heading, "rad", "scene"),
+            *([("steering_motor_torque", self.motor_torque, "N*m", "motor")] if self.motor_torque.any() else []),
         )
         return Log.of(
             [Signal(n, self.time, v, unit, source) for n, v, unit, source in made], source="simulated circuit"
@@ -144,37 +169,69 @@ class CircuitDrive:
         )
 
 
-def simulate_circuit(setting: CircuitSetting | None = None, *, seed: int = 0) -> CircuitDrive:
+def simulate_circuit(
+    setting: CircuitSetting | None = None, *, seed: int = 0, motor: Motor | None = None
+) -> CircuitDrive:
     """Drive.
 
     Args:
         setting: driver, car, laps.
         seed: of the driver's variability and the sensors' noise.
+        motor: on the column.
 
     Raises:
         UsageError: the car leaves the road.
     """
     s = setting or CircuitSetting()
-    v, dt = s.car.speed, s.dt
-    n = int(way_length(s.laps, s.direction) / (v * dt)) + 1
-    place = v * dt * np.arange(n + round(_BEYOND / (v * dt)), dtype=np.float64)
-    path = PathAhead.of(place, way_curvature(place, s.laps, s.direction))
+    path, n = circuit_path(s)
     varied = Variation.none(n)
     if s.variability is not None:
-        varied = Variation.draw(s.variability, n, dt, np.random.default_rng([seed, 61]))
-    kept = _drive(s, path, n, varied)
-    sensors = np.random.default_rng([seed, 67])
-    angle, rate, torque, aligned, beta, r, y, psi, near, far = kept
-    measured = np.round(angle / s.resolution) * s.resolution if s.resolution > 0 else angle
+        varied = Variation.draw(s.variability, n, s.dt, np.random.default_rng([seed, 61]))
+    noise = s.torque_noise * np.random.default_rng([seed, 67]).standard_normal(n)
+    return drive_along(s, path, n, varied, noise, motor, seed)
+
+
+def circuit_path(setting: CircuitSetting) -> tuple[PathAhead, int]:
+    """The way of a drive, sampled where the car is at each tick and on beyond the end, and the number of ticks."""
+    v, dt = setting.car.speed, setting.dt
+    n = int(way_length(setting.laps, setting.direction) / (v * dt)) + 1
+    place = v * dt * np.arange(n + round(_BEYOND / (v * dt)), dtype=np.float64)
+    return PathAhead.of(place, way_curvature(place, setting.laps, setting.direction)), n
+
+
+def drive_along(
+    setting: CircuitSetting, path: PathAhead, n: int, varied: Variation, noise: Array, motor: Motor | None = None, seed: int = 0
+) -> CircuitDrive:  # fmt: skip
+    """Drive along any path.
+
+    Args:
+        setting: driver and car; its laps do not count.
+        path: sampled where the car is at each tick, and on beyond the end.
+        n: ticks.
+        varied: how the driver varies.
+        noise: of the torque sensor, N m, shape (n,).
+        motor: on the column.
+        seed: to be noted.
+
+    Raises:
+        UsageError: the car leaves the road.
+    """
+    kept = _drive(setting, path, n, varied, noise, motor)
+    angle, rate, torque, aligned, beta, r, y, psi, near, far, added = kept
     return CircuitDrive(
-        s, seed, dt * np.arange(n, dtype=np.float64), angle, rate, measured, torque,
-        torque + s.torque_noise * sensors.standard_normal(n), aligned, beta, r, path.curvature[:n], y, psi, near, far, varied,
+        setting, seed, setting.dt * np.arange(n, dtype=np.float64), angle, rate, _encoded(angle, setting.resolution), torque,
+        torque + noise, aligned, beta, r, path.curvature[:n], y, psi, near, far, varied, added,
     )  # fmt: skip
 
 
-def _drive(s: CircuitSetting, path: PathAhead, n: int, varied: Variation) -> Array:
-    """Angle, rate, torque, alignment, sideslip, yaw rate, offset, heading error, near and far angle, shape (10, n)."""
-    v, car, driver, noise = s.car.speed, s.car, s.driver, s.variability
+def _encoded(angle: Array, resolution: float) -> Array:
+    """The angle as the encoder shows it."""
+    return np.round(angle / resolution) * resolution if resolution > 0 else angle
+
+
+def _drive(s: CircuitSetting, path: PathAhead, n: int, varied: Variation, noise: Array, motor: Motor | None) -> Array:
+    """Angle, rate, torque, alignment, sideslip, yaw rate, offset, heading, near and far angle, motor's torque; shape (11, n)."""
+    v, car, driver, sizes = s.car.speed, s.car, s.driver, s.variability
     h = s.dt / SUBSTEPS
     wheel, friction = tick_of(s.wheel.inertia, s.wheel.damping, h), s.wheel.friction
     plane = s.single_track().model(v)
@@ -187,27 +244,32 @@ def _drive(s: CircuitSetting, path: PathAhead, n: int, varied: Variation) -> Arr
     planned, gains = _planned(s, path, n)
     rho = path.curvature.tolist()
     columns = [x.tolist() for x in (varied.anticipation, varied.compensation, varied.near, varied.far, varied.motor)]
+    aside, sensed = wanted_offset(s.detours, s.dt * np.arange(n, dtype=np.float64)).tolist(), noise.tolist()
     tick = driver.tick(s.dt, v)
     state = tick.start()
-    share, floor = (noise.motor, noise.floor) if noise is not None else (0.0, 0.0)
-    kept = np.zeros((n, 10))
-    delta = omega = beta = r = psi = y = trembled = 0.0
-    for k, (more_far, more_near, near_noise, far_noise, motor) in enumerate(zip(*columns, strict=True)):
-        near, far = near_bend[k] - y / driver.near - psi, far_bend[k] - y / ahead - psi
+    share, floor = (sizes.motor, sizes.floor) if sizes is not None else (0.0, 0.0)
+    kept = np.zeros((n, 11))
+    delta = omega = beta = r = psi = y = trembled = added = 0.0
+    for k, (more_far, more_near, near_noise, far_noise, muscle) in enumerate(zip(*columns, strict=True)):
+        off = y - aside[k]
+        near, far = near_bend[k] - off / driver.near - psi, far_bend[k] - off / ahead - psi
         if gains is None:
             wanted = driver.anticipation * (far + far_noise)
         else:
             # The plan reckons with the car as it is, on a course that is seen as well or badly as the far point.
-            state_part = gains[0] * beta + gains[1] * r + gains[2] * (psi - far_noise) + gains[3] * y
+            state_part = gains[0] * beta + gains[1] * r + gains[2] * (psi - far_noise) + gains[3] * off
             wanted = ratio * (planned[k] + state_part)
         # Of what the muscles are told, without the noise that they had a tick ago: else noise would be gain.
-        trembled = motor * (share * abs(state.pull - trembled) + floor)
+        trembled = muscle * (share * abs(state.pull - trembled) + floor)
         state, torque = tick.advance(state, near + near_noise, more_far * wanted, delta, more_near, trembled)
         aligned = back * (beta + lever * r - delta / ratio)
-        kept[k] = delta, omega, torque, aligned, beta, r, y, psi, near, far
+        if motor is not None:
+            shown = round(delta / s.resolution) * s.resolution if s.resolution > 0 else delta
+            added = motor(k, Seen(shown, torque + sensed[k], beta, r, rho[k], y, psi))
+        kept[k] = delta, omega, torque, aligned, beta, r, y, psi, near, far, added
         for i in range(SUBSTEPS):
             steered, slid, turned, headed = delta / ratio, beta, r, psi
-            delta, omega = wheel.advance(delta, omega, torque + back * (beta + lever * r - steered), friction)
+            delta, omega = wheel.advance(delta, omega, torque + added + back * (beta + lever * r - steered), friction)
             after = delta / ratio
             beta, r = (
                 f11 * slid + f12 * turned + G0[0] * steered + G1[0] * after,

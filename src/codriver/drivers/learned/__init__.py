@@ -15,7 +15,8 @@ from codriver.drivers.learned.driver_observer import observer_of
 from codriver.drivers.learned.evaluate import Evaluation, Score, evaluate, evaluate_table
 from codriver.drivers.learned.feature_setting import FeatureSetting
 from codriver.drivers.learned.features import FeatureTable, features_of
-from codriver.drivers.learned.horizon import HorizonErrors, error_against_horizon
+from codriver.drivers.learned.horizon import error_against_horizon
+from codriver.drivers.learned.horizon_errors import HorizonErrors
 from codriver.drivers.learned.kinds import BASELINES, DEFAULT, KINDS, class_of, regressor_of
 from codriver.drivers.learned.learned_driver import LearnedDriver, TorquePrediction, fit_driver, fit_table
 from codriver.drivers.learned.prepare import prepared

@@ -95,7 +95,9 @@ def observer_of(driver: LearnedDriver) -> Observer:
         Output("driver_torque_ahead_sd", "N*m", "sd", "its standard deviation"),
         Output("valid", "1", "flag", "all signals have been there long enough, and the vehicle moves"),
     )
-    settings: dict[str, str | float] = {"driver": driver.name, "model": driver.kind, "horizon": setting.horizon}
+    settings: dict[str, str | float] = {
+        "driver": driver.name, "model": driver.kind, "horizon": setting.horizon, "road_step": setting.dt,
+    }  # fmt: skip
     return Observer(f"driver-{driver.kind}", setting.tick, inputs, (), carry, outputs, step, settings=settings)
 
 

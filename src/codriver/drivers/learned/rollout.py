@@ -25,7 +25,6 @@ from math import ceil
 from typing import NamedTuple, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from codriver.drivers.learned.features import FeatureTable
 from codriver.drivers.learned.learned_driver import LearnedDriver
@@ -33,10 +32,10 @@ from codriver.errors import UsageError
 from codriver.models.single_track import SLOWEST, SingleTrack
 from codriver.models.steering import tick_of
 from codriver.signals import Log
+from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
 from codriver.vehicles import Vehicle
 
-Flags = npt.NDArray[np.bool_]
 SUBSTEP = 0.01  # s, at most
 WIDE = 2.0
 NEEDED = ("steering_wheel_angle", "yaw_rate", "sideslip_angle", "longitudinal_speed")
@@ -181,7 +180,7 @@ def roll_out(
             "add the signals",
         )
     far = [round(f.when / dt) for f in driver.features if f.signal == "road_curvature"]
-    reach = max(far, default=1 - steps) + steps - 1
+    reach = max(far) + steps - 1 if far else -1  # nothing of the road is asked for
     if any(("road_curvature", k) not in columns for k in range(reach + 1)):
         raise UsageError(
             f"{steps} steps with a road that is not known {reach * dt:g} s ahead",
@@ -233,13 +232,16 @@ def wheel_rates(log: Log, time: Array, tick: float) -> Array:
         tick: s.
     """
     name = "steering_wheel_rate" if "steering_wheel_rate" in log else "steering_wheel_angle"
-    grid = log.sample([name], tick)
+    # On the ticks of these moments, whatever the wheel's own first stamp.
+    grid = log.sample([name], tick, start=float(time.min()) - 2 * tick, stop=float(time.max()) + tick / 2)
     values = np.where(grid.held[name], grid.values[name], np.nan)
     now = np.round((time - grid.time[0]) / tick).astype(int)
     if name == "steering_wheel_rate":
         return np.asarray(values[now])
-    one, two = np.maximum(now - 1, 0), np.maximum(now - 2, 0)
-    return np.asarray((3 * values[now] - 4 * values[one] + values[two]) / (2 * tick))
+    # A drive that has just begun, or a hole: fewer points, at last none.
+    late, early = values[now] - values[now - 1], values[now - 1] - values[now - 2]
+    late = np.nan_to_num(late)
+    return np.asarray((1.5 * late - 0.5 * np.where(np.isfinite(early), early, late)) / tick)
 
 
 def _bounded(values: Array, bound: float) -> tuple[Array, Flags]:

@@ -27,10 +27,11 @@ def figure(title: str, found: Judged) -> Chart:
     for name, rmse in found.rmse.items():
         middle, several = rmse.mean(axis=0), rmse.shape[0] > 1
         sd = rmse.std(axis=0, ddof=1) if several else np.zeros(middle.shape)
-        ends = (middle - sd, middle + sd) if several else (None, None)
+        ends = (np.maximum(middle - sd, 0.0), middle + sd) if several else (None, None)
         curves.append(Curve(METHODS[name].label, found.folds, middle, _COLORS[name], "bars", low=ends[0], high=ends[1]))
     drives = found.rmse["pwc"].shape[0]
     whiskers = f"Whiskers: standard deviation over {drives} drives." if drives > 1 else "One drive."
+    whiskers += " Bars too low to be seen stand as numbers in the table below."
     return Chart(
         f"{title}: {found.protocol.name}", "sub-data set held out", (Plot("RMSE (N m)", tuple(curves), 280),), whiskers
     )

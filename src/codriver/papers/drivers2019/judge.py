@@ -112,13 +112,13 @@ def judge(
         methods: of METHODS, one at least that is no baseline; PWC, PWL and ridge are added.
         protocol: how.
         sparse: the Gaussian process on few points.
-        tell: is told each method as it begins.
+        tell: is told each method and drive as it begins.
     """
     asked = [name for name in METHODS if name in methods and name not in BASELINES]
     rmse: dict[str, list[list[float]]] = {}
     verdict: tuple[Finding, ...] = ()
     folds: tuple[str, ...] = ()
-    for log in logs:
+    for k, log in enumerate(logs, 1):
         table = features_of([log], protocol.features)
         split = folds_of(table, protocol, ("drive",))
         folds = tuple(f.name for f in split)
@@ -126,7 +126,7 @@ def judge(
         for name in asked:
             method = METHODS[name]
             options = {**method.options, **(SPARSE if sparse and method.kind == "gp" else {})}
-            tell(method.label)
+            tell(f"{method.label}, drive {k} of {len(logs)}")
             found = evaluate_table(
                 table, split, (method.kind,), protocol=protocol, options={method.kind: options}, calibrate=False
             )

@@ -9,7 +9,7 @@ import numpy as np
 
 from codriver.estimate import Estimate
 from codriver.papers.motorcycle2018.methods import METHODS, program
-from codriver.papers.motorcycle2018.rides import JUDGED, NOISE, WORDS, Errors, Scene, judged, sizes
+from codriver.papers.motorcycle2018.rides import JUDGED, NOISE, Errors, Scene, judged, sizes
 from codriver.papers.reproduction import Tell
 from codriver.report.document import Mark, Table
 
@@ -18,7 +18,8 @@ COUNTS = 4096
 SENSORS: dict[str, dict[str, float]] = {
     "ideal": {}, "noise": {"noise": NOISE, "counts": COUNTS}, "bias": {"noise": NOISE, "counts": COUNTS, "bias": 1.0},
 }  # fmt: skip
-SAID = {"ideal": "ideal", "noise": "noisy", "bias": "noisy, biased"}
+SAID = {"ideal": "ideal", "noise": "noisy", "bias": "biased"}
+SHORT = {"track": "track", "slalom": "slalom", "double-lane-change": "lane change"}
 QUANTITY = {
     "roll_angle": "Roll angle", "rider_torque": "Rider's torque", "front_lateral_force": "Front tyre's lateral force",
     "rear_lateral_force": "Rear tyre's lateral force", "lateral_velocity": "Lateral velocity",
@@ -56,13 +57,16 @@ class Compared:
         """
         columns = [(ride, kind) for ride in self.zero for kind in SENSORS]
         rows: list[tuple[str | float | Mark | None, ...]] = [
-            (METHODS[m].label, *(None if (e := self.errors[m, *c][name]) != e else e for c in columns)) for m in METHODS
+            (METHODS[m].short, *(None if (e := self.errors[m, *c][name]) != e else e for c in columns)) for m in METHODS
         ]
         size: tuple[str | float | Mark | None, ...] = (
             "answering zero",
             *(self.zero[ride][name] for ride, _ in columns),
         )
-        head = ("observer", *(f"{WORDS[ride]}, {SAID[kind]}" for ride, kind in columns))
+        head = (
+            "observer",
+            *(f"{SHORT[ride]}, {SAID[kind]}" if kind == "ideal" else SAID[kind] for ride, kind in columns),
+        )
         return Table(head, (*rows, size), f"{QUANTITY[name]}: RMSE, {JUDGED[name][0]}.")
 
 
@@ -102,3 +106,8 @@ def estimate(method: str, ride: Scene, kind: str = "ideal") -> Estimate:
     sensors = SENSORS[kind]
     log = ride.measures(1, sensors.get("noise", 0.0)) if METHODS[method].fed else ride.log(1, **sensors)
     return program(method).run(log)
+
+
+def legend() -> Table:
+    """What the short names of the tables stand for."""
+    return Table(("observer", "what it is"), tuple((m.short, m.label) for m in METHODS.values()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -206,7 +207,7 @@ def _steering(rides: Sequence[Scene]) -> Item:
     return Item(
         "V.C: the slower, the more is steered", "2 deg on track and slalom, 0.5 in the lane change",
         ", ".join(f"{WORDS[n]} {x:.1f}" for n, x in largest.items()) + " deg", "",
-        all(bent[a] > bent[b] for a, b in zip(order, order[1:], strict=False)),
+        all(bent[a] > bent[b] for a, b in pairwise(order)),
         "the largest steer angles, on courses of our own; judged by steer over lateral acceleration, rms, which must fall as "
         "the mean "
         "speed grows: " + ", ".join(f"{WORDS[n]} {bent[n]:.2f} deg per m/s² at {speed[n]:.0f} km/h" for n in order),

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from codriver.errors import DesignError
+from codriver.models.motorcycle import motorcycle_model
+from codriver.observers.motorcycle_uio import design_motorcycle_uio
 from codriver.papers.item import Item
-from codriver.papers.motorcycle2018.compare import Compared
-from codriver.papers.motorcycle2018.methods import METHODS
-from codriver.papers.motorcycle2018.rides import NOISE, RATE, WORDS
+from codriver.papers.motorcycle2018.compare import Compared, legend
+from codriver.papers.motorcycle2018.methods import METHODS, RANGE, machine
+from codriver.papers.motorcycle2018.rides import DT, NOISE, RATE, WORDS
 from codriver.papers.reproduction import Chapter
 from codriver.report.document import Table
 
@@ -36,7 +39,10 @@ def tables_chapter(found: Compared) -> Chapter:
     names = ("roll_angle", "rider_torque", "front_lateral_force", "rear_lateral_force", "lateral_velocity")
     items = (*_third(found), *_second(found), *_said(found), *_beside(found))
     return Chapter(
-        "Tables II and III: the errors (V.D)", words, (_against(found), *(found.table(name) for name in names)), items
+        "Tables II and III: the errors (V.D)",
+        words,
+        (_against(found), legend(), *(found.table(name) for name in names)),
+        items,
     )
 
 
@@ -90,6 +96,7 @@ def _second(found: Compared) -> tuple[Item, ...]:
             "of [25], whose model is nonlinear in roll and steer; ours is linear, fed with a = v W. "
             f"At most {ALIKE:g} times counts",
         ))  # fmt: skip
+    made.append(_existence())
     return tuple(made)
 
 
@@ -158,3 +165,26 @@ def _beside(found: Compared) -> tuple[Item, ...]:
         + ", ".join(WORDS[r] for r in torque) + ". The EKF is judged",
     ))  # fmt: skip
     return tuple(made)
+
+
+def _existence() -> Item:
+    """From which measurements of (21) an unknown-input observer can be made."""
+    model = motorcycle_model(machine())
+    rows = dict(zip(model.outputs, model.C, strict=True))
+    sets = {
+        "all five": tuple(rows), "no steering rate": tuple(n for n in rows if n != "steer_rate"),
+        "angle and acceleration": ("steer_angle", "lateral_acceleration"),
+    }  # fmt: skip
+    there = {}
+    for name, chosen in sets.items():
+        try:
+            design_motorcycle_uio(model.with_outputs({n: rows[n] for n in chosen}), *RANGE, DT)
+            there[name] = "exists"
+        except DesignError:
+            there[name] = "refused"
+    return Item(
+        "an unknown-input observer exists for (21)", None, ", ".join(f"{name}: {said}" for name, said in there.items()), "",
+        there["all five"] == "exists",
+        "not in the paper; the torque must show in the first derivative of what is measured, at each speed, and no zero may be "
+        "unstable",
+    )  # fmt: skip
