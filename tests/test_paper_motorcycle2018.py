@@ -111,7 +111,7 @@ class TestVerdicts:
 
     def test_as_told(self):
         told = made_up(
-            {"paper": 0.8, "fed": 0.8, "ts": 0.8, "calm": 0.8, "uio": 1.3, "imu-plain": 2.0, "ekf": 0.5}, 1.05
+            {"paper": 0.8, "fed": 0.8, "ts": 0.8, "calm": 0.78, "uio": 1.3, "imu-plain": 2.0, "ekf": 0.5}, 1.05
         )
         items = tables_2018.tables_chapter(told).items
         doubtful = [i.item for i in items if not i.holds]

@@ -66,6 +66,12 @@ class Ride:
         """Of the rear frame's mass centre over the road, m/s, shape (n,)."""
         return np.hypot(self.of("x_rate"), self.of("y_rate"))
 
+    @property
+    def ahead(self) -> Array:
+        """Velocity of the road point along the machine, m/s, shape (n,): in a turn it is outside of the mass centre, and faster."""
+        yaw, side = self.of("yaw"), self.rider.machine.parameters.sharp.h * np.sin(self.of("roll"))
+        return np.cos(yaw) * self.of("x_rate") + np.sin(yaw) * self.of("y_rate") - side * self.of("yaw_rate")
+
 
 def level(_distance: float) -> float:
     """A road without bank.

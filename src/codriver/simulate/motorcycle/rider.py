@@ -3,11 +3,12 @@
     a = kappa(s + v T) v^2 - k_d e' - k_p e,   phi_ref = -atan(a / g) / (1 + share m_b l / (m h))     e offset of the road point
     tau: `rider_law`
     lambda_ref = share phi_ref,   hips (k_b - m_b g l) lambda_ref     lean of the body beside the machine
-    M = (m (v_ref' + (v_ref - v) / tau_v) + drag) R                   to the rear wheel when positive, front brake when negative
+    M = (m (v_ref' + (v_ref - v) / tau_v) + drag) R                   to the rear wheel; when negative, by `FRONT_BRAKE` to both
     w' = -w / T_w + noise                                             remnant, added to the torque; he does not know it
     L = -(k_L phi + c_L phi') at a standstill, gone at `FEET_UP`      feet on the road
 
-The wanted roll is filtered over `smoothing`, s. One point ahead is looked at, at T s, about what the machine takes to lean.
+The wanted roll is filtered over `smoothing`, s; throttle and brakes follow over `WRIST_TIME`. One point ahead is looked at, at T s,
+about what the machine takes to lean.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ LeanPlan = Callable[[float], float]  # rad of the time, s
 FEET_DOWN, FEET_UP = 2.5, 4.0  # m/s
 FEET = 5000.0, 800.0  # k_L, N m/rad, and c_L, N m s/rad
 FRONT_BRAKE = 0.6  # share of the front brake
+LET_GO = 0.5  # m/s, below which the brakes are let go, so that they never push back
 REMNANT_TIME = 0.2  # s
+WRIST_TIME = 0.15  # s, over which throttle and brakes follow
 RIDABLE = 3.0  # m/s, the slowest at which the handlebar is used as at speed
 (X, Y, YAW, ROLL, STEER, X_RATE, Y_RATE, YAW_RATE, ROLL_RATE, STEER_RATE, FRONT, REAR) = (
     STATES.index(name)
@@ -79,13 +82,14 @@ class Rider:
     seed: int = 0
     _noise: np.random.Generator = field(init=False, repr=False)
     _beside: float = field(default=0.0, init=False)
+    _push: float = field(default=0.0, init=False)
     _wanted: float = field(default=0.0, init=False)
     _hands: Hands | None = field(default=None, init=False, repr=False)
     _distance: float = field(default=0.0, init=False)
 
     def begin(self) -> None:
         """Forget the last ride."""
-        self._wanted, self._distance, self._beside, self._hands = 0.0, 0.0, 0.0, None
+        self._wanted, self._distance, self._beside, self._push, self._hands = 0.0, 0.0, 0.0, 0.0, None
         self._noise = np.random.default_rng(self.seed)
 
     @property
@@ -122,9 +126,11 @@ class Rider:
         body = parameters.upper_body
         if body is not None:
             given["lean_torque"] = (body.stiffness - body.mass * p.g * body.above) * self.body * self._wanted
-        now = self.speed(time, self._distance)
-        wish = (self.speed(time + 0.05, self._distance + 0.05 * v) - now) / 0.05 + (now - v) / self.speed_time
-        push = p.mass * wish + parameters.air_density * parameters.drag_area / 2 * v * v
+        now, ahead = self.speed(time, self._distance), state[X_RATE] * cos(state[YAW]) + state[Y_RATE] * sin(state[YAW])
+        wish = (self.speed(time + 0.05, self._distance + 0.05 * v) - now) / 0.05 + (now - ahead) / self.speed_time
+        wanted_push = p.mass * wish + parameters.air_density * parameters.drag_area / 2 * v * v
+        self._push += dt / WRIST_TIME * (wanted_push - self._push)
+        push = self._push if self._push > 0 else self._push * min(max(ahead / LET_GO, 0.0), 1.0)
         given["drive_torque"], given["front_brake_torque"] = (
             (max(push, 0) - (1 - FRONT_BRAKE) * max(-push, 0)) * p.Rr,
             FRONT_BRAKE * max(-push, 0) * p.Rf,

@@ -162,7 +162,7 @@ class RideRecord:
         return Log.of(signals, source=f"simulated motorcycle, {self.setting.scenario}")
 
     def truth(self) -> Log:
-        """What was true; roll from the road's normal, yaw about it, speed over ground."""
+        """What was true; roll from the road's normal, yaw about it, velocities of the road point below the rear frame."""
         d = self.ride
         roll, steer, aside, yaw_rate, roll_rate, steer_rate, front, rear = d.linear.T
         made = (
@@ -170,7 +170,7 @@ class RideRecord:
             ("lateral_velocity", aside, "m/s"), ("heading_rate", yaw_rate, "rad/s"), ("roll_rate", roll_rate, "rad/s"),
             ("steer_rate", steer_rate, "rad/s"), ("front_lateral_force", front, "N"), ("rear_lateral_force", rear, "N"),
             ("rider_torque", d.of("rider_torque"), "N*m"), ("rider_lean", d.of("rider_lean"), "rad"),
-            ("longitudinal_speed", d.speed, "m/s"), ("distance", d.distance, "m"), ("lateral_offset", d.offset, "m"),
+            ("longitudinal_speed", d.ahead, "m/s"), ("distance", d.distance, "m"), ("lateral_offset", d.offset, "m"),
             ("road_bank", d.of("bank"), "rad"),
         )  # fmt: skip
         return Log.of([Signal(n, d.time, v, unit, "simulation") for n, v, unit in made], source="simulated motorcycle")
