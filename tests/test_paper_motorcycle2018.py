@@ -13,7 +13,7 @@ from codriver.papers.motorcycle2018 import reproduce
 from codriver.papers.motorcycle2018 import tables as tables_2018
 from codriver.papers.motorcycle2018.claims import late_by
 from codriver.papers.motorcycle2018.compare import SENSORS, Compared
-from codriver.papers.motorcycle2018.frames import frames_chapter, framed
+from codriver.papers.motorcycle2018.frames import framed, frames_chapter
 from codriver.papers.motorcycle2018.methods import METHODS, machine, program
 from codriver.papers.motorcycle2018.model import model_chapter
 from codriver.papers.motorcycle2018.rides import JUDGED, WORDS, errors, judged, scene, sizes
