@@ -101,6 +101,7 @@ class TestFrames:
         assert f.off["a turn"] < 0.4 * f.off["a"]
         assert f.off["a signed"] < 0.5 * f.off["a squares"]
         items = frames_chapter([ride]).items
+        assert found(items, "IMU at the mass centre").holds is False
         assert found(items, "the same sign").holds is False
         assert found(items, "a = v W is nearer").holds
         assert found(items, "(20)").holds
@@ -111,7 +112,17 @@ class TestVerdicts:
 
     def test_as_told(self):
         told = made_up(
-            {"paper": 0.8, "fed": 0.8, "ts": 0.8, "calm": 0.78, "uio": 1.3, "imu-plain": 2.0, "ekf": 0.5}, 1.05
+            {
+                "paper": 0.8,
+                "fed": 0.8,
+                "ts": 0.8,
+                "calm": 0.78,
+                "uio": 1.3,
+                "uio-fed": 1.3,
+                "imu-plain": 2.0,
+                "ekf": 0.5,
+            },
+            1.05,
         )
         items = tables_2018.tables_chapter(told).items
         doubtful = [i.item for i in items if not i.holds]
@@ -120,7 +131,7 @@ class TestVerdicts:
         ]  # fmt: skip
 
     def test_otherwise(self):
-        items = tables_2018.tables_chapter(made_up({"fed": 9.0, "uio": 4.0}, 1.5)).items
+        items = tables_2018.tables_chapter(made_up({"fed": 9.0, "uio-fed": 4.0}, 1.5)).items
         assert [i.item for i in items if i.holds] == ["an unknown-input observer exists for (21)"]
 
     def test_best_has_sensors(self):

@@ -11,14 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from codriver.models.motorcycle import motorcycle_coefficients
 from codriver.models.road_frame import GRAVITY, by_turn
 from codriver.papers.item import Item
 from codriver.papers.motorcycle2018.compare import SENSORS
 from codriver.papers.motorcycle2018.methods import machine
-from codriver.papers.motorcycle2018.rides import WORDS, Scene
+from codriver.papers.motorcycle2018.rides import WORDS, Scene, with_imu
 from codriver.papers.reproduction import Chapter
 from codriver.report.document import BLACK, Chart, Curve, Plot, Table
 from codriver.signals.signal import Array
+from codriver.simulate.motorcycle import nominal_machine
 
 TURNING = 0.5  # m/s^2: below it the sign of a lateral acceleration is not asked for
 SHOWN = 10  # ticks from point to point of a chart
@@ -94,6 +96,8 @@ def frames_chapter(rides: Sequence[Scene]) -> Chapter:
     ideal = {ride.name: framed(ride) for ride in rides}
     noisy = {ride.name: framed(ride, **SENSORS["noise"]) for ride in rides}
     same = {name: f.same for name, f in ideal.items()}
+    centre = _mass_centre()
+    central = framed(with_imu(rides[-1], centre))
     negative = {name: float(np.mean(f.radicand < 0)) for name, f in ideal.items()}
     worse = {name: f.off["a squares"] / f.off["a turn"] for name, f in ideal.items()}
     wide = {name: f.off["W squares"] / f.off["W"] for name, f in ideal.items()}
@@ -111,6 +115,11 @@ def frames_chapter(rides: Sequence[Scene]) -> Chapter:
              f"{_listed({n: f.off['a'] for n, f in ideal.items()}, '.2f')}. a = v W errs by "
              f"{_listed({n: f.off['a turn'] for n, f in ideal.items()}, '.2f')}, (17) with the yaw rate's sign by "
              f"{_listed({n: f.off['a signed'] for n, f in ideal.items()}, '.2f')}"),
+        Item("(17) with the IMU at the mass centre", "as close as possible", f"same sign {central.same:.0%}, "
+        f"{central.off['a squares']:.2f} m/s²",
+             "", central.off["a squares"] <= 0.2 * central.off["a"],
+             f"{WORDS[rides[-1].name]}, ideal sensors, IMU {centre[2]:.2f} m above the road in place of "
+             f"{nominal_machine().imu[2]:.2f}: the sign hangs on how high it is, since what it takes to lean depends on that"),
         Item("(17): the root's argument is never negative", "not asked", _listed(negative, ".0%"), "", max(negative.values()) == 0,
              "share of ticks with f_y² + f_z² < g², ideal sensors: heave and pitch, which (16) leaves out, and a falling or rising "
              "body"),
@@ -137,6 +146,12 @@ def frames_chapter(rides: Sequence[Scene]) -> Chapter:
         "(16)-(20)", words, (*(_chart(r, ideal[r.name]) for r in rides[:1]), _table(ideal, noisy)),
         items,
     )  # fmt: skip
+
+
+def _mass_centre() -> tuple[float, float, float]:
+    """Of both frames, from the road point below the rear frame's."""
+    q = motorcycle_coefficients(machine())
+    return q["m34"] / q["m33"], 0.0, q["m35"] / q["m33"]
 
 
 def _listed(values: dict[str, float], form: str) -> str:

@@ -116,6 +116,8 @@ METHODS: dict[str, Method] = {
                      lambda: motorcycle_kalman(model(), DT)),
     "uio": Method("unknown-input observer, a = v W", "UIO", "#E69F00",
                   lambda: behind(motorcycle_uio(design_motorcycle_uio(motorcycle_model(machine()), *RANGE, DT), DT))),
+    "uio-fed": Method("unknown-input observer, given the measurements of (21) themselves", "UIO, fed", "#B8860B",
+                      lambda: motorcycle_uio(design_motorcycle_uio(motorcycle_model(machine()), *RANGE, DT), DT), fed=True),
     "imu": Method("IMU and speed alone, tyres' width known", "IMU", "#757575",
                   lambda: motorcycle_imu(DT, crown_correction(lean_machine()))),
     "imu-plain": Method("IMU and speed alone, a point mass on thin tyres", "IMU, plain", "#A9A9A9", lambda: motorcycle_imu(DT)),

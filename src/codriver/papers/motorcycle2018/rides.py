@@ -17,7 +17,7 @@ from codriver.names import quantity
 from codriver.program import Program
 from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
-from codriver.simulate.motorcycle import RideRecord, RideSetting, sense, simulate_ride
+from codriver.simulate.motorcycle import Machine, RideRecord, RideSetting, sense, simulate_ride
 from codriver.simulate.motorcycle.scenarios import sensors_of
 
 RATE = 200  # of sensors and observers, Hz
@@ -105,6 +105,21 @@ def scene(scenario: str, seconds: float | None = None, **machine: float) -> Scen
     setting = RideSetting(scenario, counts=0, rate=RATE, seconds=seconds, **machine)  # type: ignore[arg-type]
     record = simulate_ride(setting, 1)
     return Scene(record, record.truth())
+
+
+def with_imu(ride: Scene, place: tuple[float, float, float]) -> Scene:
+    """The same ride with the IMU elsewhere.
+
+    Args:
+        ride: the ride.
+        place: in the rear frame, forward, left, up of the road point below its mass centre, m.
+    """
+    d, setting = ride.record.ride, ride.record.setting
+    machine = Machine(replace(setting.machine(), imu=place))
+    outputs = np.array([machine.output(x, u) for x, u in zip(d.states, d.inputs, strict=True)])
+    moved = replace(d, outputs=outputs)
+    seed = ride.record.seed
+    return Scene(RideRecord(setting, seed, moved, sense(moved, sensors_of(setting, moved, seed), seed)), ride.truth)
 
 
 def errors(estimate: Estimate, ride: Scene, after: float = SETTLE) -> Errors:
