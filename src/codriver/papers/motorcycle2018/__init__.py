@@ -62,10 +62,8 @@ def reproduce(
         PAPERS["motorcycle2018"][1],
         "Every table, figure and claim of the paper beside what codriver finds. The paper's BikeSim rides and its machine's "
         "parameters were never published; in their place stand a nonlinear motorcycle of this project (Sharp's masses and "
-        "tyres, with "
-        "width, saturation, suspension, load transfer and a leaning rider) and three rides like those described. The observer "
-        "knows "
-        "the linear model alone, as the paper's does.",
+        "tyres, with width, saturation, suspension, load transfer and a leaning rider) and three rides like those described. "
+        "The observer knows the linear model alone, as the paper's does.",
         tuple(chapters),
         (("rides", ", ".join(f"{WORDS[r.name]} {r.record.ride.time[-1]:.0f} s" for r in rides)),
          ("readings of noisy sensors", str(seeds)), ("noise", f"{NOISE:.1%} of rms at {RATE} Hz")),

@@ -97,10 +97,10 @@ def _low_pass(ride: Scene, filtered: dict[float, dict[str, tuple[float, float]]]
         "V.C: a third-order Butterworth filter denoises without significant delay", "sufficient",
         f"noise in the torque {noise:.2f} to {left:.2f} N m, error {whole:.1f} to {error:.1f} N m, at {best:g} Hz", "",
         bool(kept) and left <= 0.5 * noise,
-        f"{WORDS[ride.name]}, given measurements with 7.5 % noise. Half of the noise with an error that grows by no more than 5 % "
-        f"counts; {'the lowest such' if kept else 'none does, this is the least error'} of "
-        f"{', '.join(f'{c:g}' for c in CUTOFFS)} Hz. "
-        f"It is {1e3 * late_by(best):.0f} ms late, which costs more than the noise where the torque is quick",
+        f"{WORDS[ride.name]}, given measurements with 7.5 % noise. Half of the noise with an error that grows by no more than 5 "
+        f"% counts; {'the lowest such' if kept else 'none does, this is the least error'} of "
+        f"{', '.join(f'{c:g}' for c in CUTOFFS)} Hz. It is {1e3 * late_by(best):.0f} ms late, which costs more than the noise "
+        "where the torque is quick",
     )  # fmt: skip
 
 
@@ -134,8 +134,7 @@ def _arrives(started: dict[str, tuple[float, float]]) -> Item:
     return Item(
         "V.A: it converges rapidly from another start", "rapidly", started["ts"][1], "s", started["ts"][1] <= 1.0,
         f"begun upright while the machine leans by {lean:.0f} deg; until the roll stays within {CLOSE:g} deg of that of an "
-        f"observer "
-        "that ran from the beginning. One second counts. LMI with a = v W; others: "
+        "observer that ran from the beginning. One second counts. LMI with a = v W; others: "
         + ", ".join(f"{METHODS[m].short} {s:.2f} s" for m, (_, s) in started.items() if m != "ts"),
     )  # fmt: skip
 
@@ -173,7 +172,7 @@ def _sideways(found: Compared, rides: Sequence[Scene]) -> Item:
         ", ".join(f"{WORDS[n]} {x:.0%}" for n, x in share.items()),
         "",
         max(share.values()) >= 0.3,
-        f"RMSE over rms, LMI with a = v W, ideal sensors; 30 % in one ride counts. EKF: "
+        "RMSE over rms, LMI with a = v W, ideal sensors; 30 % in one ride counts. EKF: "
         f"{', '.join(f'{x:.0%}' for x in best.values())}",
     )
 

@@ -60,10 +60,9 @@ def design_chapter(rides: Sequence[Scene], quick: bool) -> Chapter:
              _euler(main), _real_time(ride))  # fmt: skip
     words = (
         "gamma weighs errors of unlike units against noise and torque rate, and means nothing without them. Here an error of 1 "
-        "deg of "
-        "roll, 0.1 deg of steer, 0.05 m/s, 2 deg/s, 100 N, 5 N m each counts 1; the torque's rate is 80 N m/s, D the sensors' "
-        "sd by "
-        "the root of their rate. The certificate below is computed from gains and Lyapunov matrix by plain eigenvalues.",
+        "deg of roll, 0.1 deg of steer, 0.05 m/s, 2 deg/s, 100 N, 5 N m each counts 1; the torque's rate is 80 N m/s, D the "
+        "sensors' sd by the root of their rate. The certificate below is computed from gains and Lyapunov matrix by plain "
+        "eigenvalues.",
     )
     claims = Findings(tuple(("ok", claim) for claim in main.certificate.claims))
     return Chapter(
@@ -140,8 +139,7 @@ def _goal(main: MotorcycleLMI, calm: MotorcycleLMI, ride: Scene) -> Item:
         f"gamma {main.gamma:.3f}: {a['roll_angle']:.2f} deg; {calm.gamma:.3f}: {b['roll_angle']:.2f} deg", "",
         a["roll_angle"] < b["roll_angle"],
         "not in the paper, which takes it so; roll with noise. What errs here is no white noise: a = v W and the linear model "
-        "err as "
-        "slowly as the machine leans",
+        "err as slowly as the machine leans",
     )  # fmt: skip
 
 
@@ -154,8 +152,8 @@ def _scheduling(main: MotorcycleLMI, constant: MotorcycleLMI, ride: Scene) -> It
     return Item(
         "(35): a gain that goes with the speed earns its place", None, f"gamma {cost:+.2%}, roll {ratio - 1:+.0%} without", "",
         cost >= 0.05 or ratio >= 1.05,
-        f"not in the paper; one gain at all speeds against two, {WORDS[ride.name]} with noise; 5 % worse without counts. The speed "
-        "matters in A(v), which both have",
+        f"not in the paper; one gain at all speeds against two, {WORDS[ride.name]} with noise; 5 % worse without counts. The "
+        "speed matters in A(v), which both have",
     )  # fmt: skip
 
 
@@ -165,8 +163,7 @@ def _euler(design: MotorcycleLMI) -> Item:
         "forward Euler will do at the sensors' rate", None, ", ".join(f"{1 / dt:.0f} Hz {x:.2f}" for dt, x in worst.items()), "",
         max(worst.values()) < 1,
         "not in the paper; greatest |1 + dt s| of the observer's poles, below 1 is stable. The observer here sums the Taylor "
-        "series "
-        "of its own matrix instead",
+        "series of its own matrix instead",
     )  # fmt: skip
 
 

@@ -68,8 +68,7 @@ def _chapter(ride: Scene) -> Chapter:
     ideal = place.sensors == "ideal"
     words = (
         f"As in the paper, the sensors are {'ideal' if ideal else 'noisy'} here. Signs are ISO 8855: roll is positive to the "
-        f"right, "
-        "all else to the left.",
+        "right, all else to the left.",
     )
     charts = [_path(ride, place), *_measured(ride, place), _estimated(ride, place)]
     items = [_perfectly(ride, place)]
@@ -127,8 +126,7 @@ def _estimated(ride: Scene, place: Place) -> Chart:
         "time (s)",
         tuple(plots),
         "LMI, (17): the observer as the paper has it; it leaves the picture where it must. LMI, fed: the same, given the "
-        "measurements "
-        "of (21) themselves. LMI, a = v W: the same gains.",
+        "measurements of (21) themselves. LMI, a = v W: the same gains.",
     )
 
 
@@ -209,6 +207,5 @@ def _steering(rides: Sequence[Scene]) -> Item:
         ", ".join(f"{WORDS[n]} {x:.1f}" for n, x in largest.items()) + " deg", "",
         all(bent[a] > bent[b] for a, b in pairwise(order)),
         "the largest steer angles, on courses of our own; judged by steer over lateral acceleration, rms, which must fall as "
-        "the mean "
-        "speed grows: " + ", ".join(f"{WORDS[n]} {bent[n]:.2f} deg per m/s² at {speed[n]:.0f} km/h" for n in order),
+        "the mean speed grows: " + ", ".join(f"{WORDS[n]} {bent[n]:.2f} deg per m/s² at {speed[n]:.0f} km/h" for n in order),
     )  # fmt: skip

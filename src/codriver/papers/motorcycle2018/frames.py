@@ -106,8 +106,7 @@ def frames_chapter(rides: Sequence[Scene]) -> Chapter:
         Item("IV.A: both lateral accelerations systematically have the same sign", "systematically", _listed(same, ".0%"), "",
              min(same.values()) >= 0.95,
              f"share of ticks with more than {TURNING:g} m/s² along the road, ideal sensors; 95 % counts. In a balanced turn "
-             f"gravity "
-             "and turn cancel along the body's y, and wide tyres let gravity win: the sign is then the wrong one"),
+             "gravity and turn cancel along the body's y, and wide tyres let gravity win: the sign is then the wrong one"),
         Item("(17): the lateral acceleration by squares", "considered as measured",
              _listed({n: f.off["a squares"] for n, f in ideal.items()}, ".2f") + " m/s²", "",
              max(f.off["a squares"] / f.off["a"] for f in ideal.values()) <= 0.2,
@@ -121,8 +120,8 @@ def frames_chapter(rides: Sequence[Scene]) -> Chapter:
              f"{WORDS[rides[-1].name]}, ideal sensors, IMU {centre[2]:.2f} m above the road in place of "
              f"{nominal_machine().imu[2]:.2f}: the sign hangs on how high it is, since what it takes to lean depends on that"),
         Item("(17): the root's argument is never negative", "not asked", _listed(negative, ".0%"), "", max(negative.values()) == 0,
-             "share of ticks with f_y² + f_z² < g², ideal sensors: heave and pitch, which (16) leaves out, and a falling or rising "
-             "body"),
+             "share of ticks with f_y² + f_z² < g², ideal sensors: heave and pitch, which (16) leaves out, and a falling or "
+             "rising body"),
         Item("(19): the yaw rate by squares", "considered as measured", _listed(wide, ".1%"), "", max(wide.values()) <= 0.05,
              "RMS error over the rate's rms, ideal sensors; 5 % counts. With r / cos phi of a balanced turn "
              f"{_listed({n: f.off['W turn'] / f.off['W'] for n, f in ideal.items()}, '.1%')}; with noise "
@@ -132,19 +131,17 @@ def frames_chapter(rides: Sequence[Scene]) -> Chapter:
              "greatest RMS error of the rides, ideal sensors; 0.02 counts"),
         Item("(18) with no pitch rate gives the roll at once", None, lean, "deg", lean <= 2.0,
              "not in the paper, though it follows: phi = atan2(q, r). Greatest RMS error, where it turns, ideal sensors; 2 deg "
-             "counts. "
-             f"With noise {max(f.off['lean'] for f in noisy.values()):.1f}"),
+             f"counts. With noise {max(f.off['lean'] for f in noisy.values()):.1f}"),
         Item("a = v W is nearer than (17)", None, _listed(worse, ".1f"), "", min(worse.values()) > 1,
              "not in the paper; RMS error of (17) over that of a = v W, ideal sensors"),
     )  # fmt: skip
     words = (
-        "The model is told of motion along the road, the sensors lean. The paper squares away the unknown roll. What stands in for "
-        "that here: in a balanced turn a = v W and sin phi = -v r / g, without root and sign.",
+        "The model is told of motion along the road, the sensors lean. The paper squares away the unknown roll. What stands in "
+        "for that here: in a balanced turn a = v W and sin phi = -v r / g, without root and sign.",
     )
     return Chapter(
-        "From the body's frame to the road's "
-        "(16)-(20)", words, (*(_chart(r, ideal[r.name]) for r in rides[:1]), _table(ideal, noisy)),
-        items,
+        "From the body's frame to the road's (16)-(20)", words,
+        (*(_chart(r, ideal[r.name]) for r in rides[:1]), _table(ideal, noisy)), items,
     )  # fmt: skip
 
 

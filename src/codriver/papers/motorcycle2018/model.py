@@ -38,14 +38,14 @@ def model_chapter() -> Chapter:
     unstable = max(float(np.linalg.eigvals(wrong.A(v)).real.max()) for v in (10.0, 20.0, 30.0))
     items = (
         Item("(1)-(11): the coefficients are those of Sharp 1971", None, worst, "1/s", worst <= 0.06,
-             "not in the paper, which refers to [28] and prints no parameters. Greatest distance from the roots that Sharp prints "
-             "for his machine at 10 to 160 ft/s; his last digits are 0.01 and 0.1, and 0.06 counts"),
+             "not in the paper, which refers to [28] and prints no parameters. Greatest distance from the roots that Sharp "
+             "prints for his machine at 10 to 160 ft/s; his last digits are 0.01 and 0.1, and 0.06 counts"),
         Item("(2), (3): F = C_1 alpha + C_2 lambda", "as printed", f"C_1 must be negative, or a root is at {unstable:+.0f} 1/s", "",
              False, "with the slip angles of (3), whose sign is that of the motion, a positive stiffness pushes the wheel on. "
              "Greatest root at 10, 20, 30 m/s with the sign as printed"),
         Item("(8): m_66 times the steering rate", "m_66 δ'", "m_66 δ''", "", False,
-             "m_66 is an inertia; (11) needs the acceleration. In (3) and (17)-(19) the psi of the state is its rate; r_86 of (10) "
-             "is 0: the rear tyre does not see the steering rate"),
+             "m_66 is an inertia; (11) needs the acceleration. In (3) and (17)-(19) the psi of the state is its rate; r_86 of "
+             "(10) is 0: the rear tyre does not see the steering rate"),
         _exact(), _braking(), *_observability(),
     )  # fmt: skip
     return Chapter(
@@ -102,8 +102,8 @@ def _braking() -> Item:
     return Item(
         "terms in dv/dt may be left out", None, f"at {BRAKING:g} m/s² roll accelerates the steer {share:+.0%} differently", "",
         share < 0.1,
-        "not in the paper, which does so. By the large-angle model, upright, at 20 m/s: load on the front wheel and the braking "
-        f"force turn with it; the greatest root moves by {moved:+.2f} 1/s. Below 10 % counts",
+        "not in the paper, which does so. By the large-angle model, upright, at 20 m/s: load on the front wheel and the "
+        f"braking force turn with it; the greatest root moves by {moved:+.2f} 1/s. Below 10 % counts",
     )  # fmt: skip
 
 
@@ -128,12 +128,11 @@ def _observability() -> tuple[Item, ...]:
         Item("V.A: the three sensors guarantee observability", "observable", f"rank {ranks['all']} of 9", "", ranks["all"] == 9,
              f"at {SPEEDS} speeds; the angles, rates and acceleration of (21)"),
         Item("all three sensors are needed", None, f"rank {ranks['no a_y']} without acceleration, {ranks['gyro']} by gyroscope "
-        f"alone", "",
+        "alone", "",
              ranks["no a_y"] < 9 or ranks["gyro"] < 9,
              "not in the paper. How well is another matter: from one second of noisy measurements and nothing else the roll's "
-             "standard "
-             f"deviation is up to {worse['no a_y']:.2f} times as large without the acceleration, {worse['gyro']:.2f} by "
-             f"gyroscope alone"),
+             f"standard deviation is up to {worse['no a_y']:.2f} times as large without the acceleration, {worse['gyro']:.2f} "
+             "by gyroscope alone"),
     )  # fmt: skip
 
 

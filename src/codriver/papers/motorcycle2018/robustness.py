@@ -56,8 +56,8 @@ def robustness_chapter(rides: Sequence[Scene], found: Compared, quick: bool, tel
     return Chapter(
         "Robustness: rider, tyres, road, speed, biases",
         ("The paper calls its observer robust and shows noise. Every observer here is designed for a rider of 75 kg, tyres as "
-        "Sharp has "
-         "them and a flat road, and is told of nothing else. Noisy sensors throughout; the roll is from the road's normal.",),
+        "Sharp has them and a flat road, and is told of nothing else. Noisy sensors throughout; the roll is from the road's "
+        "normal.",),
         shown, items,
     )  # fmt: skip
 
@@ -78,8 +78,7 @@ def _paper(errors: dict[tuple[str, str, str], Errors], rides: Sequence[Scene]) -
     return (Item(
         "abstract: effective and robust", "robust", f"{value:.2f} deg, {rise:.1f} times the nominal at most", "", rise <= 1.5,
         f"LMI with a = v W over rider, tyres, bank and speed; worst: {label}, {WORDS[ride]}. Half as much again as nominal in "
-        f"each ride "
-        "counts",
+        "each ride counts",
     ),)  # fmt: skip
 
 
@@ -107,8 +106,7 @@ def _upright(rides: Sequence[Scene]) -> tuple[Item, ...]:
         made.append(Item(
             f"on a banked road the roll is told from the road, {WORDS[nominal.name]}", None, normal, "deg", normal <= size / 2,
             f"not in the paper; EKF. Told from the vertical it errs by {vertical:.2f} deg: gyroscope and accelerometer do not "
-            f"see the "
-            f"road. The bank has {size:.1f} deg rms; half of it counts",
+            f"see the road. The bank has {size:.1f} deg rms; half of it counts",
         ))  # fmt: skip
     return tuple(made)
 
@@ -122,8 +120,7 @@ def _lmi(errors: dict[tuple[str, str, str], Errors], rides: Sequence[Scene]) -> 
         "biases matter less than noise", None, ", ".join(f"{METHODS[m].short} {x:+.2f}" for m, x in rise.items()) + " deg", "",
         rise["ts"] < 0.2,
         "not in the paper, whose noise is centred. Greatest rise of the roll's RMSE by 0.5 deg/s and 0.2 m/s²; for the LMI "
-        "observer 0.2 "
-        "deg counts. The EKF has biases among its states",
+        "observer 0.2 deg counts. The EKF has biases among its states",
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from codriver.observers.motorcycle_uio import design_motorcycle_uio
 from codriver.papers.item import Item
 from codriver.papers.motorcycle2018.compare import Compared, legend
 from codriver.papers.motorcycle2018.methods import METHODS, RANGE, machine
-from codriver.papers.motorcycle2018.rides import DT, NOISE, RATE, WORDS
+from codriver.papers.motorcycle2018.rides import DT, NOISE, RATE, SETTLE, WORDS
 from codriver.papers.reproduction import Chapter
 from codriver.report.document import Table
 
@@ -26,15 +26,15 @@ def tables_chapter(found: Compared) -> Chapter:
     Args:
         found: judged.
     """
+    leans = ", ".join(f"{WORDS[ride]} {z['roll_angle']:.0f}" for ride, z in found.zero.items())
     words = (
-        "Our rides are not the paper's, of which no figures are printed, and our machine is not BikeSim's: numbers can agree in "
-        f"size, not in digits. On the track ours leans to 44 degrees. Noise is {NOISE:.1%} of each signal's rms at {RATE} Hz on "
-        "gyroscope and accelerometer, and an encoder of 4096 counts; biases are 0.5 deg/s and 0.2 m/s². Errors count from 3 s on.",
+        "Our rides are not the paper's, of which no figures are printed, and our machine is not BikeSim's: numbers can agree "
+        f"in size, not in digits. Ours lean by {leans} deg rms. Noise is {NOISE:.1%} of each signal's rms at {RATE} Hz on "
+        "gyroscope and accelerometer, and an encoder of 4096 counts; biases are 0.5 deg/s and 0.2 m/s². Errors count from "
+        f"{SETTLE:g} s on.",
         "The paper's observer stands first, behind (17) and (19); then the same given the measurements of (21) themselves, as "
-        "a simulator "
-        "can but no sensor does: noise is then 7.5 % of each one's largest value. In the rows below a = v W takes the place of "
-        "(17). "
-        "“Calm” was chosen with these rides at hand, which flatters it.",
+        "a simulator can but no sensor does: noise is then 7.5 % of each one's largest value. In the rows below a = v W takes "
+        "the place of (17). “Calm” was chosen with these rides at hand, which flatters it.",
     )
     names = ("roll_angle", "rider_torque", "front_lateral_force", "rear_lateral_force", "lateral_velocity")
     items = (*_third(found), *_second(found), *_said(found), *_beside(found))
@@ -67,9 +67,8 @@ def _third(found: Compared) -> tuple[Item, ...]:
             fed, value = found.roll("fed", ride, kind), found.roll("paper", ride, kind)
             made += [
                 Item(f"table III: roll, {where}, measurements of (21) as they are", PAPER[ride][k], fed, "deg", fed <= limit,
-                     f"the LMI observer given true yaw and steer rate and acceleration along the road, "
-                     f"{'' if k else 'no '}noise on each; "
-                     f"at most {ALIKE:g} times the paper's figure counts"),
+                     "the LMI observer given true yaw and steer rate and acceleration along the road, "
+                     f"{'with' if k else 'without'} noise on each; at most {ALIKE:g} times the paper's figure counts"),
                 Item(f"table III: roll, {where}, from what sensors show by (17)-(20)", PAPER[ride][k], value, "deg", value <= limit,
                      f"the same observer behind (17) and (19); at most {ALIKE:g} times the paper's figure counts. With a = v W "
                      f"{found.roll('ts', ride, kind):.2f}, calm {found.roll('calm', ride, kind):.2f}, answering zero "
@@ -86,15 +85,15 @@ def _second(found: Compared) -> tuple[Item, ...]:
     made = [
         Item("table II: vision system, and mean of vision and IMU", "2.24 and 1.20 deg", "no camera here", "", None, "of [26]"),
         Item("table II: IMU with a Kalman filter", IMU, plain, "deg", plain <= ALIKE * IMU,
-             f"of [26], on another track; ours is a point mass on thin tyres, and {imu:.2f} with the tyres' width: what wide tyres "
-             f"take and what large leans add nearly cancel. At most {ALIKE:g} times counts"),
+             f"of [26], on another track; ours is a point mass on thin tyres, and {imu:.2f} with the tyres' width: what wide "
+             f"tyres take and what large leans add nearly cancel. At most {ALIKE:g} times counts"),
     ]  # fmt: skip
     for k, (paper, ours) in enumerate(zip(UIO, uio, strict=True)):
         made.append(Item(
             f"table II: unknown-input observer, {'ideal' if k == 0 else 'realistic'} sensors", paper, ours, "deg",
             ours <= ALIKE * paper,
-            "of [25], whose model is nonlinear in roll and steer; ours is linear. Given the measurements of (21) themselves; from "
-            f"sensors with a = v W {found.roll('uio', 'track', KINDS[k]):.2f}. At most {ALIKE:g} times counts",
+            "of [25], whose model is nonlinear in roll and steer; ours is linear. Given the measurements of (21) themselves; "
+            f"from sensors with a = v W {found.roll('uio', 'track', KINDS[k]):.2f}. At most {ALIKE:g} times counts",
         ))  # fmt: skip
     made.append(_existence())
     return tuple(made)
@@ -108,8 +107,8 @@ def _said(found: Compared) -> tuple[Item, ...]:
             gain = 1 - found.roll("fed", "track", name) / found.roll("uio-fed", "track", name)
             made.append(Item(
                 f"V.D: better than the UIO, {'ideal' if name == 'ideal' else 'noisy'} sensors", told, gain, "1", gain >= told / 2,
-                "1 less the LMI observer's RMSE over the UIO's, both given the measurements of (21), track; half the paper's gain "
-                f"counts. From sensors, both with a = v W, "
+                "1 less the LMI observer's RMSE over the UIO's, both given the measurements of (21), track; half the paper's "
+                "gain counts. From sensors, both with a = v W, "
                 f"{1 - found.roll('ts', 'track', name) / found.roll('uio', 'track', name):.2f}",
             ))  # fmt: skip
         harder = all(
