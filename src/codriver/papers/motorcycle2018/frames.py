@@ -129,9 +129,9 @@ def frames_chapter(rides: Sequence[Scene]) -> Chapter:
              f"{_listed({n: f.off['W turn'] / f.off['W'] for n, f in noisy.items()}, '.1%')}"),
         Item("(20): the roll rate is the gyroscope's", "trivial", rate, "rad/s", rate <= 0.02,
              "greatest RMS error of the rides, ideal sensors; 0.02 counts"),
-        Item("(18) with no pitch rate gives the roll at once", None, lean, "deg", lean <= 2.0,
-             "not in the paper, though it follows: phi = atan2(q, r). Greatest RMS error, where it turns, ideal sensors; 2 deg "
-             f"counts. With noise {max(f.off['lean'] for f in noisy.values()):.1f}"),
+        Item("(18) with no pitch rate is a poor roll", None, lean, "deg", lean > 2.0,
+             "not in the paper, though it follows: phi = atan2(q, r). Greatest RMS error, where it turns, ideal sensors; more "
+             f"than 2 deg counts. With noise {max(f.off['lean'] for f in noisy.values()):.1f}"),
         Item("a = v W is nearer than (17)", None, _listed(worse, ".1f"), "", min(worse.values()) > 1,
              "not in the paper; RMS error of (17) over that of a = v W, ideal sensors"),
     )  # fmt: skip
