@@ -5,6 +5,7 @@ Noise as the 2018 paper has it: 7.5 % of each sensor's rms at 1 kHz; biases of 0
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -18,13 +19,15 @@ from codriver.simulate.motorcycle import (
     Ride,
     Rider,
     RideSensors,
-    double_lane_change,
+    RideSetting,
     ramp,
     relative_noise,
     ride,
     sense,
-    slalom,
+    simulate_ride,
+    straight,
 )
+from codriver.simulate.motorcycle.files import nominal_vehicle
 
 DEGREE, KMH = np.pi / 180, 1 / 3.6
 NAMES = {
@@ -41,16 +44,11 @@ TRUTH = {
 
 @cache
 def machine() -> Machine:
+    """Without suspension, on a rider who sits still."""
     return Machine(MachineParameters(MotorcycleParameters.from_vehicle(cd.load_vehicle("sharp1971"))))
 
 
-@cache
-def vehicle() -> cd.Vehicle:
-    """Sharp's machine with the IMU where the simulated one has it."""
-    made = cd.load_vehicle("sharp1971")
-    for name, value in zip(("imu_forward", "imu_left", "imu_height"), machine().parameters.imu, strict=True):
-        made = made.with_parameter(name, value, source="the simulated machine")
-    return made
+vehicle = cache(nominal_vehicle)
 
 
 def _steady(value: float):
@@ -61,26 +59,18 @@ def _steady(value: float):
 def leaning_ride() -> Ride:
     """4.5 s at 70 km/h: to 30 degrees to the right and over to the left."""
     lean = lambda t: 0.55 * np.sin(2 * np.pi * max(t - 0.5, 0.0) / 5.0)  # noqa: E731
-    return ride(Rider(machine(), slalom(0.0, 100.0), _steady(70 * KMH), lean=lean), 4.5)
+    return ride(Rider(machine(), straight(), _steady(70 * KMH), lean=lean), 4.5)
 
 
 @cache
-def lane_change_ride() -> Ride:
-    """At 100 km/h, 9 s."""
-    return ride(Rider(machine(), double_lane_change(3.5, 70.0, 40.0), _steady(100 * KMH)), 9.0)
-
-
-@cache
-def slalom_ride() -> Ride:
-    """From 50 to 100 km/h, 16 s."""
-    return ride(Rider(machine(), slalom(1.5, 100.0), ramp(50 * KMH, 100 * KMH, 2.0, 14.0)), 16.0)
+def scenario(name: str) -> Ride:
+    """Of the paper's kind, on a machine with suspension and a rider who leans his body: truth at 1 kHz."""
+    return simulate_ride(RideSetting(name, rate=1000), seed=1).ride
 
 
 def noisy(done: Ride, **more: object) -> RideSensors:
-    """The paper's noise, and an encoder of 4096 counts."""
-    from dataclasses import replace
-
-    return replace(relative_noise(done, 0.075), **more)
+    """The paper's noise, an encoder of 4096 counts, the front wheel's speed."""
+    return replace(relative_noise(done, 0.075), wheel=True, **more)
 
 
 def ride_log(done: Ride, sensors: RideSensors, seed: int = 0, every: int = 1, start: int = 0) -> cd.Log:

@@ -21,7 +21,7 @@ from codriver.observers.motorcycle_uio import design_motorcycle_uio, motorcycle_
 from codriver.observers.series import series, terms_needed
 from codriver.observers.speed_tracker import CARRY, track_speed
 from codriver.testing import check_observer
-from rides import DEGREE, errors, lane_change_ride, leaning_ride, noisy, ride_log, rms, slalom_ride, vehicle
+from rides import DEGREE, errors, leaning_ride, noisy, ride_log, rms, scenario, vehicle
 
 LOW, HIGH, DT = 8.0, 40.0, 0.005
 
@@ -195,7 +195,7 @@ def test_exported(name, form, real, tmp_path):
 @pytest.mark.parametrize(
     ("name", "slalom", "lane_change", "torque"),
     [
-        ("motorcycle-kalman", 0.5, 0.5, 6), ("motorcycle-ts", 1.1, 0.9, 8), ("motorcycle-uio", 1.0, 1.7, 8),
+        ("motorcycle-kalman", 0.5, 0.5, 8), ("motorcycle-ts", 1.1, 0.9, 8), ("motorcycle-uio", 1.6, 1.7, 10),
         ("motorcycle-imu", 1.5, 1.8, None),
     ],
 )  # fmt: skip
@@ -204,7 +204,7 @@ def test_bounds_on_rides(name, slalom, lane_change, torque):
     if name == "motorcycle-ts":
         pytest.importorskip("cvxpy")
     program = cd.compile(build(name, vehicle(), dt=DT))
-    for done, most in ((slalom_ride(), slalom), (lane_change_ride(), lane_change)):
+    for done, most in ((scenario("slalom"), slalom), (scenario("double-lane-change"), lane_change)):
         found = program.run(ride_log(done, noisy(done)))
         assert rms(errors(found, done, "roll_angle")) < most * DEGREE
         if torque is not None:

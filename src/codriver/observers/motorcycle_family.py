@@ -38,6 +38,7 @@ PARAMETERS = tuple(LETTERS.values())
 BALANCED = ("steer_angle", "roll_rate", "yaw_rate", "longitudinal_speed")
 CHAINED = ("longitudinal_speed", "yaw_rate", "steer_angle", "roll_rate")  # the same, as the parts of a chain want them
 RANGE = (8.0, 45.0)  # m/s, of the observers by LMI and of the unknown input
+RATE = 100.0  # Hz, at which errors of the balanced turn are independent, however often it is sampled
 WINDOW = 0.04  # s, of the differentiator in front of them
 
 
@@ -55,7 +56,7 @@ def _kalman(vehicle: Vehicle | None, design: Design) -> Observer:
 def _ts(vehicle: Vehicle | None, design: Design) -> Observer:
     assert vehicle is not None
     model = motorcycle_model(MotorcycleParameters.from_vehicle(vehicle)).with_walking_inputs()
-    made = design_motorcycle_lmi(model, *RANGE, design.dt)
+    made = design_motorcycle_lmi(model, *RANGE, design.dt, rate=min(RATE, 1 / design.dt))
     return _of(vehicle, on_the_road(motorcycle_ts_observer(made)))
 
 
