@@ -119,8 +119,7 @@ def _slow(name: str, case: Case, grid: Grid) -> Iterator[Row]:
         say(f"  {title} against {other}")
         note = agree(found, work(rows) / sizes, CLOSE)
         took = measure(lambda work=work: work(rows), 3).best * count / len(rows)
-        rate = f"{count / ours.best / 1e6:.2g} million samples/s; {other} {len(rows) / (took * len(rows) / count):.0f} samples/s, "
-        note += f"; {rate}measured on {len(rows)} samples and scaled"
+        note += f"; {count / ours.best:,.0f} samples/s, {other} {count / took:,.0f}, measured on {len(rows)} samples and scaled"
         yield compared(title, ours.best, other, took, note, None, ours.spread)
 
 
