@@ -59,6 +59,17 @@ def test_from_drives_to_a_driver_to_torques_foretold(laps: Path, tmp_path: Path)
     assert 0.85 < told["inside95"] < 1
 
 
+def test_signals_of_ones_own_choice(laps: Path, tmp_path: Path) -> None:
+    driver = tmp_path / "anna.driver"
+    command = ("driver", "fit", laps / "anna.csv", *names(laps), "--model", "ridge", "-o", driver)
+    told = json.loads(ran(*command, "--signals", "steering_wheel_angle,road_curvature", "--json"))
+    assert told["signals"] == ["steering_wheel_angle", "road_curvature", "longitudinal_speed"]
+    assert told["left_out"] == []
+    done = CliRunner().invoke(app, [str(word) for word in (*command, "--signals", "steering_angel")])
+    assert isinstance(done.exception, CodriverError)
+    assert "standard names" in str(done.exception)
+
+
 def test_evaluate_holds_drives_out_and_says_who_wins(laps: Path, tmp_path: Path) -> None:
     report = tmp_path / "judged.html"
     command = ("driver", "evaluate", laps / "anna.csv", laps / "anna2.csv", *names(laps), "--model", "ridge", "--both")

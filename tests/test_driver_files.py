@@ -161,6 +161,7 @@ class TestFromFilesToADrive:
             (("--by", "magic"), "magic"),
             (("--known", "K_q=1"), "K_q"),
             (("--beside", "no.toml"), "no.toml"),
+            (("--seek", "far", "--by", "dual-ekf"), "far by 'dual-ekf'"),
         ):
             assert said in refused(*words, *more).found
         # No file but a driver's is replaced.

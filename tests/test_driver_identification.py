@@ -159,7 +159,9 @@ class TestRefusals:
         for change in (
             {"asked": ()},
             {"asked": ("delay", "delay")},
-            {"asked": ("near",)},
+            {"asked": ("near",), "by": "dual-ekf"},
+            {"also": ("far",), "by": "dual-ekf"},
+            {"asked": ("nearest",)},
             {"by": "magic"},
             {"spread": 0.0},
         ):
@@ -198,6 +200,25 @@ class TestRefusals:
         )
         with pytest.raises(LogError, match="a drive with curves"):
             identify_driver(log)
+
+
+class TestWhereHeLooks:
+    @pytest.mark.slow
+    def test_found_by_the_road(self):
+        # Given wrong, the far point makes a driver who fits and is wrong; sought, it is found, and intervals hold.
+        truth = CIRCUIT_DRIVERS["carla"]
+        log = simulate_circuit(CircuitSetting(truth, laps=1), seed=1).log()
+        known = TwoPointDriver(far=1.43)
+        given, sought = (identify_driver(log, known, also=also) for also in ((), ("near", "far")))
+        assert given.explained > 0.999
+        assert abs(np.log(given.best.delay / truth.delay)) > 0.5
+        assert sought.parameters["far"].value == pytest.approx(truth.far, rel=0.06)
+        assert sought.one_step < given.one_step
+        for p in sought.parameters.values():
+            assert abs(np.log(p.value / getattr(truth, p.name))) < 3 * p.sd / p.value
+        assert "near" not in sought.given
+        assert np.std(sought.records[0].torque - sought.torque()) < 0.05
+        assert sought.filed("x").driver() == sought.driver()
 
 
 class TestSeveral:
@@ -287,6 +308,16 @@ class TestParts:
         assert np.abs(record.near[rows] - drive.near[rows]).max() < 1e-6
         assert np.abs(record.far[rows] - drive.far[rows]).max() < 1e-6
 
+    @pytest.mark.parametrize("alone", [False, True])
+    def test_other_points(self, clean, alone):
+        log = without(clean, "lateral_offset", "heading_error") if alone else clean
+        one, other = (driver_record(log, near, far) for near, far in ((6.0, 1.3), (5.0, 1.1)))
+        assert one.summed is alone
+        near, far = one.seen(5.0, 1.1)
+        assert np.abs(near - other.near).max() < 1e-9
+        assert np.abs(far - other.far).max() < 1e-9
+        assert one.seen(6.0, 1.3)[0] is one.near
+
     def test_whitening(self):
         rng = np.random.default_rng(0)
         from scipy.signal import lfilter
@@ -332,7 +363,7 @@ class TestDualFilter:
         record = driver_record(clean, truth.near, truth.far)
         names = ("anticipation", "compensation", "delay")
         known = replace(truth, anticipation=4.6, compensation=9.0, delay=0.12)
-        ends = {r: dual_ekf(record, known, names, recurrent=r).last() for r in (True, False)}
+        ends = {r: dual_ekf(record, known, names, DualTuning(doubt=2.0), recurrent=r).last() for r in (True, False)}
         assert ends[True]["anticipation"][0] == pytest.approx(truth.anticipation, rel=0.02)
         assert ends[True]["compensation"][0] == pytest.approx(truth.compensation, rel=0.15)
         off = {r: abs(np.log(end["anticipation"][0] / truth.anticipation)) for r, end in ends.items()}

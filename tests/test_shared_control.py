@@ -210,6 +210,13 @@ class TestForetold:
             simulate_shared(SharedSetting(ONE_LAP, Assist("predicted")))
         with pytest.raises(UsageError, match=r"ticks every 0\.1 s in a drive that ticks every 0\.03 s"):
             simulate_shared(SharedSetting(replace(ONE_LAP, dt=0.03), Assist("predicted")), compiled())
+        log = driven(direction="left")
+        sideways = replace(
+            log["yaw_rate"], name="lateral_acceleration", values=14 * log["yaw_rate"].values, unit="m/s^2"
+        )
+        other = compile(observer_of(fit_driver(log.with_signals(sideways), "pwc")))
+        with pytest.raises(UsageError, match="a driver model that wants lateral_acceleration"):
+            simulate_shared(SharedSetting(ONE_LAP, Assist("predicted")), other)
         with pytest.raises(UsageError, match="assist 'help'"):
             Assist("help")
         with pytest.raises(UsageError, match="gain is -1"):
@@ -392,6 +399,14 @@ class TestCommand:
         assert {"authority", "driver_torque_ahead"} <= set(table.column_names)
         assert (out / "drive.csv").read_text().splitlines()[0].endswith(",MotorTorque")
         assert "Change against no assist" in report.read_text()
+        assert not any("learnt at" in f["text"] for f in told["findings"])
+        slower = (
+            CliRunner()
+            .invoke(app, [*command, "--overwrite", "--drives", "1", "--speed", "40", "--report", str(report)])
+            .output
+        )
+        assert "drives at 40 km/h here" in report.read_text()
+        assert "learnt at 50 km/h on average, and drives at 40 km/h here" in slower
         again = CliRunner().invoke(app, command)
         assert isinstance(again.exception, CodriverError)
         said = CliRunner().invoke(

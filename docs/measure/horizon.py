@@ -1,4 +1,4 @@
-"""Error against horizon, of docs/drivers.md: simulated drives, direct and iterated, also through vehicles that are wrong; recorded drives.
+"""Error against horizon, of docs/drivers.md: simulated drives, also iterated through vehicles that are wrong; recorded drives.
 
 Run from a clone: python docs/measure/horizon.py [circuit] [wrong] [udacity]
 """

@@ -1,4 +1,4 @@
-"""The table of observers in motorcycle.md: python docs/measure/motorcycle_observers.py. Some minutes."""
+"""The tables of observers in motorcycle.md: python docs/measure/motorcycle_observers.py. Some minutes."""
 
 # ruff: noqa: T201
 from __future__ import annotations
@@ -8,25 +8,21 @@ from dataclasses import replace
 import numpy as np
 
 import codriver as cd
-from codriver.models import MotorcycleParameters
 from codriver.names import quantity
 from codriver.simulate.motorcycle import (
     IDEAL,
-    Machine,
-    MachineParameters,
+    SCENARIOS,
     Ride,
-    Rider,
     RideSensors,
-    double_lane_change,
-    ramp,
+    RideSetting,
     relative_noise,
-    ride,
     sense,
-    slalom,
+    simulate_ride,
 )
+from codriver.simulate.motorcycle.files import nominal_vehicle
 
-KMH, DEGREE = 1 / 3.6, np.pi / 180
-DT, SHARE, SEEDS, START = 1e-3, 0.075, 4, 1.0
+DEGREE = np.pi / 180
+RATE, SHARE, SEEDS, START = 1000, 0.075, 4, 1.0
 OBSERVERS = (
     ("motorcycle-ekf", "kalman"), ("motorcycle-kalman", "kalman"), ("motorcycle-kalman", "constant"), ("motorcycle-ts", "kalman"),
     ("motorcycle-uio", "kalman"), ("motorcycle-imu", "kalman"),
@@ -43,54 +39,84 @@ TRUTH = (
 )
 
 
-def rides(machine: Machine) -> dict[str, Ride]:
-    """Slalom, double lane change, and a steady turn of 36 degrees."""
-    steady = ramp(70 * KMH, 70 * KMH, 0.0, 1.0)
-    return {
-        "slalom": ride(Rider(machine, slalom(1.5, 100.0), ramp(50 * KMH, 100 * KMH, 2.0, 14.0)), 16.0),
-        "lane change": ride(
-            Rider(machine, double_lane_change(3.5, 70.0, 40.0), ramp(100 * KMH, 100 * KMH, 0.0, 1.0)), 9.0
-        ),
-        "turn": ride(Rider(machine, slalom(0.0, 100.0), steady, lean=lambda t: 0.55 if t > 1 else 0.0), 10.0),
-    }
-
-
 def kinds(done: Ride) -> dict[str, RideSensors]:
-    """Ideal, noisy, and noisy with biases."""
-    noisy = relative_noise(done, SHARE)
+    """Ideal, noisy, and noisy with biases; all with the front wheel's speed."""
+    noisy = replace(relative_noise(done, SHARE), wheel=True)
     bias = {"gyro_bias": (0.5 * DEGREE,) * 3, "accelerometer_bias": (0.2,) * 3}
-    return {"ideal": IDEAL, "noise": noisy, "noise and bias": replace(noisy, **bias)}
+    return {"ideal": replace(IDEAL, wheel=True), "noise": noisy, "noise and bias": replace(noisy, **bias)}
 
 
-def errors(program: cd.Program, done: Ride, sensors: RideSensors, seed: int) -> list[float]:
-    """Mean squared errors of what the observer estimates, from START on."""
+# Rides on another machine, road or speed than the filter is told of; and what is not told to the filter.
+WRONG = {
+    "as told": {}, "tyres of 70 %": {"tyre_stiffness": 0.7}, "rider of 60 kg": {"rider_mass": 60.0},
+    "rider of 110 kg": {"rider_mass": 110.0}, "speed 2 % high": {"speed_error": 0.02},
+    "road banks by 3 degrees": {"bank": 3 * DEGREE},
+}  # fmt: skip
+UNTOLD = {
+    "no crowns": ("front_crown_radius", "rear_crown_radius"), "no trail": ("pneumatic_trail",), "no drag": ("drag",),
+}  # fmt: skip
+
+
+def errors(
+    program: cd.Program, done: Ride, sensors: RideSensors, seed: int, left_out: tuple[str, ...] = ()
+) -> tuple[list[float], float]:
+    """Mean squared errors of what the observer estimates, from START on, and the share of it within the roll's 95 % band."""
     measured = sense(done, sensors, seed)
-    log = cd.Log.of([cd.Signal(name, done.time, measured[key], quantity(name).unit) for key, name in NAMES.items()])
+    kept = {key: name for key, name in NAMES.items() if name not in left_out}
+    log = cd.Log.of([cd.Signal(name, done.time, measured[key], quantity(name).unit) for key, name in kept.items()])
     found = program.run(log)
-    made = []
+    made, late, inside = [], found.time >= START, np.nan
     for name, true, unit in TRUTH:
         if name in found:
             off = found[name].values - np.interp(found.time, done.time, done.of(true))
-            made.append(float(np.mean((off[found.time >= START] / unit) ** 2)))
-    return made
+            made.append(float(np.mean((off[late] / unit) ** 2)))
+            sd = found.sd(name)
+            if name == "roll_angle" and sd is not None:
+                inside = float(np.mean(np.abs(off) < 1.96 * sd, where=late))
+    return made, inside
 
 
 def main() -> None:
     """Print the table."""
-    parameters = MachineParameters(MotorcycleParameters.from_vehicle(cd.load_vehicle("sharp1971")))
-    vehicle = cd.load_vehicle("sharp1971")
-    for name, value in zip(("imu_forward", "imu_left", "imu_height"), parameters.imu, strict=True):
-        vehicle = vehicle.with_parameter(name, value, source="the simulated machine")
-    done = rides(Machine(parameters))
+    done = {name: simulate_ride(RideSetting(name, rate=RATE), seed=1).ride for name in SCENARIOS}
     for observer, form in OBSERVERS:
-        program = cd.compile(cd.build(observer, vehicle, dt=DT, form=form))
+        program = cd.compile(cd.build(observer, nominal_vehicle(), dt=1 / RATE, form=form))
         for name, one in done.items():
-            cells = []
+            cells, covered = [], []
             for kind, sensors in kinds(one).items():
                 many = [errors(program, one, sensors, seed) for seed in range(1 if kind == "ideal" else SEEDS)]
-                cells.append(" / ".join(f"{x:.3g}" for x in np.sqrt(np.mean(many, axis=0))))
-            print(f"| {observer} ({form}) | {name} | {' | '.join(cells)} |", flush=True)
+                cells.append(" / ".join(f"{x:.3g}" for x in np.sqrt(np.mean([m for m, _ in many], axis=0))))
+                covered.append(f"{np.mean([c for _, c in many]):.2f}")
+            print(f"| {observer} ({form}) | {name} | {' | '.join(cells)} | {' '.join(covered)} |", flush=True)
+
+
+def wrong() -> None:
+    """Print what is told wrong costs the default."""
+
+    def told(vehicle: cd.Vehicle) -> cd.Program:
+        return cd.compile(cd.build("motorcycle-ekf", vehicle, dt=1 / RATE))
+
+    def say(what: str, program: cd.Program, setting: RideSetting, left_out: tuple[str, ...] = ()) -> None:
+        done = simulate_ride(setting, seed=1).ride
+        sensors = replace(relative_noise(done, SHARE), wheel=True, speed_scale=1 + setting.speed_error)
+        squares, inside = errors(program, done, sensors, 0, left_out)
+        print(
+            f"| {what} | {setting.scenario} | {' / '.join(f'{x:.3g}' for x in np.sqrt(squares))} | {inside:.2f} |",
+            flush=True,
+        )
+
+    program, vehicle = told(nominal_vehicle()), nominal_vehicle()
+    for what, changed in WRONG.items():
+        for scenario in ("slalom", "track"):
+            say(what, program, RideSetting(scenario, rate=RATE, **changed))
+    for what, names in UNTOLD.items():
+        less = vehicle
+        for name in names:
+            less = less.with_parameter(name, 0.0, source="not told")
+        say(what, told(less), RideSetting("track", rate=RATE))
+    say("no pitch rate, vertical", program, RideSetting("track", rate=RATE), ("pitch_rate", "vertical_acceleration"))
 
 
 if __name__ == "__main__":
     main()
+    wrong()

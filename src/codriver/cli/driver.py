@@ -40,6 +40,14 @@ Options = Annotated[
         "--set", metavar="NAME=VALUE", help="A parameter of the model, such as components=21.", show_default=False
     ),
 ]
+Signals = Annotated[
+    str | None,
+    typer.Option(
+        "--signals",
+        help="Whose past the model sees beside the torque's, with commas between. Default: all it knows to use.",
+        show_default=False,
+    ),
+]
 Report = Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)]
 
 
@@ -53,7 +61,7 @@ def fit(
         str | None, typer.Option("--name", help="Whose it is. Default: the file's name.", show_default=False)
     ] = None,
     dbc: Dbc = None, names: Names = None, bus: Bus = None, vehicle: VehicleName = None, protocol: ProtocolName = "honest",
-    horizon: Horizon = None, options: Options = None, report: Report = None, json: Json = False,
+    horizon: Horizon = None, signals: Signals = None, options: Options = None, report: Report = None, json: Json = False,
 ) -> None:  # fmt: skip
     """Learn how a driver steers from drives with a torque sensor, or with what estimates the torque (--vehicle).
 
@@ -69,7 +77,7 @@ def fit(
     class_of(model)
     check_driver_name(out)
     check_report(report)
-    chosen, parameters = protocol_of(protocol, horizon), parse_options(options or [])
+    chosen, parameters = with_signals(protocol_of(protocol, horizon), signals), parse_options(options or [])
     with working(not json, len(drives) + 2) as stage:
         logs, notes = read_drives(drives, dbc, names, bus, vehicle, stage)
         stage(f"learning {model}")
@@ -143,6 +151,31 @@ def protocol_of(name: str, horizon: float | None) -> Protocol:
     if name not in PROTOCOLS:
         raise UsageError(f"--protocol {name}", f"one of {', '.join(PROTOCOLS)}", "choose one")
     return PROTOCOLS[name] if horizon is None else PROTOCOLS[name].with_features(horizon=horizon)
+
+
+def with_signals(protocol: Protocol, names: str | None) -> Protocol:
+    """A protocol whose features have the past of these signals only.
+
+    Args:
+        protocol: which features it has else.
+        names: standard names with commas between; None leaves the protocol's.
+
+    Raises:
+        UsageError: one is no standard name.
+    """
+    from codriver.errors import UsageError
+    from codriver.names import VOCABULARY
+
+    if names is None:
+        return protocol
+    wanted = tuple(name.strip() for name in names.split(",") if name.strip())
+    strange = [name for name in wanted if name not in VOCABULARY]
+    if strange or not wanted:
+        raise UsageError(
+            f"--signals {names}", f"standard names with commas between, such as {','.join(protocol.features.past[:2])}",
+            "see docs/names.md",
+        )  # fmt: skip
+    return protocol.with_features(past=wanted)
 
 
 def parse_options(texts: list[str]) -> dict[str, Any]:

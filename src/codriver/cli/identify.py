@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from codriver.vehicles import Vehicle
 
 app = typer.Typer(
-    help="Identify coefficients of a vehicle from its drives; the result is a vehicle file.",
+    help="Identify coefficients of a vehicle, or a driver, from drives; the result is a vehicle or driver file.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from codriver.cli.identify import Overwrite, Report, _check_outputs, _finite
+from codriver.cli.identify import Report, _check_outputs, _finite
 from codriver.cli.identify_alignment import app
-from codriver.cli.options import Bus, Dbc, Json, Names, VehicleName
+from codriver.cli.options import Bus, Dbc, Json, Names
 
 if TYPE_CHECKING:
     from codriver.identify import DriverFit
@@ -29,6 +29,9 @@ Known = Annotated[
     str, typer.Option("--known", metavar="NAME=VALUE,...",
                       help='Parameters that are not sought, SI: "K_r=0.15, far=1.2". Default: K_r, near, far of the usual driver.'),
 ]  # fmt: skip
+Seek = Annotated[
+    str, typer.Option("--seek", metavar="NAMES", help='Sought beside: "near, far", where he looks. Default: they are given.'),
+]  # fmt: skip
 By = Annotated[
     str, typer.Option("--by", help="road; direct (prediction errors, for a driver who is always the same); or dual-ekf (2019).")
 ]  # fmt: skip
@@ -37,12 +40,18 @@ Beside = Annotated[
     typer.Option("--beside", metavar="OTHER.toml", help="Another driver file to compare with, such as truth.toml of a simulation.",
                  show_default=False),
 ]  # fmt: skip
+VehicleName = Annotated[
+    str | None, typer.Option("--vehicle", help="Built-in name or TOML file: its column tells the torque, where no sensor does.",
+                             show_default=False),
+]  # fmt: skip
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a driver file that is there.")]
 
 
 @app.command("driver")
 def driver(
-    drives: Drives, out: Out, known: Known = "", by: By = "road", beside: Beside = None, dbc: Dbc = None, names: Names = None,
-    bus: Bus = None, vehicle: VehicleName = None, report: Report = None, overwrite: Overwrite = False, json: Json = False,
+    drives: Drives, out: Out, known: Known = "", seek: Seek = "", by: By = "road", beside: Beside = None, dbc: Dbc = None,
+    names: Names = None, bus: Bus = None, vehicle: VehicleName = None, report: Report = None, overwrite: Overwrite = False,
+    json: Json = False,
 ) -> None:  # fmt: skip
     """Gains, times and arms of a two-point driver, with standard errors, from drives on a known road (2019, section 5.3).
 
@@ -56,10 +65,11 @@ def driver(
     from codriver.identify import identify_driver
     from codriver.identify.driver_fit import WAYS
     from codriver.identify.driver_verdict import driver_findings
-    from codriver.models.two_point_file import load_two_point, save_two_point
+    from codriver.models.two_point_file import load_two_point, named, save_two_point
     from codriver.report.two_point import two_point_document
 
     base, held = parse_known(known)
+    also = [named(word.strip()) for word in seek.split(",") if word.strip()]
     if by not in WAYS:
         raise UsageError(f"--by {by}", f"one of {', '.join(WAYS)}", "choose one")
     other = load_two_point(beside) if beside is not None else None
@@ -70,7 +80,7 @@ def driver(
     with working(not json, len(drives) + 1) as stage:
         logs, notes = read_drives(drives, dbc, names, bus, vehicle, stage)
         stage("identifying")
-        fit = identify_driver(list(logs.values()), base, held=held, by=by)
+        fit = identify_driver(list(logs.values()), base, held=held, also=also, by=by)
     filed = fit.filed(out.stem)
     document = two_point_document(fit, other, command_line())
     _write(document, report, lambda: save_two_point(filed, out))

@@ -13,6 +13,8 @@ from codriver.cli.options import Json
 from codriver.cli.simulate_circuit import Ahead, Direction, Driver, Given, Out, Overwrite, Seed, Speed, Varied
 
 if TYPE_CHECKING:
+    from codriver.finding import Finding
+    from codriver.program import Program
     from codriver.simulate.shared_outcomes import Outcome
 
 Model = Annotated[
@@ -40,6 +42,7 @@ Drives = Annotated[
     int, typer.Option("--drives", min=1, max=100, help="Compare over so many drives: this seed and the next.")
 ]
 Report = Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)]
+OTHER_SPEED = 0.05  # share by which a speed is another than the model's
 
 
 def shared(
@@ -83,7 +86,7 @@ def shared(
     kinds = dict.fromkeys(("none", *(("present",) if assist == "predicted" else ()), assist))
     with working(not json, len(kinds) + 2) as stage:
         stage("compiling the driver model")
-        program = _compiled(model) if assist == "predicted" else None
+        program, notes = _compiled(model, circuit.car.speed) if assist == "predicted" else (None, [])
         stage("driving")
         first = simulate_shared(SharedSetting(circuit, chosen, used_to_it), program, seed=seed)
         found: dict[str, list[Outcome]] = {}
@@ -96,12 +99,12 @@ def shared(
         else:
             alone = simulate_shared(SharedSetting(circuit), seed=seed)
             with complete_or_nothing(report) as draft:
-                write_document(shared_document(first, alone, found, driver, command_line()), draft)
+                write_document(shared_document(first, alone, found, driver, command_line(), notes), draft)
                 files = write_shared(out, first)
     told: dict[str, Any] = {
         "driver": driver, "assist": assist, "gain": gain, "used_to_it": used_to_it, "drives": drives, "seed": seed,
         "model": str(model) if model is not None else None, "outcomes": {k: _told(v) for k, v in found.items()},
-        "findings": [{"severity": f.severity, "text": f.text} for f in verdict(found)],
+        "findings": [{"severity": f.severity, "text": f.text} for f in (*notes, *verdict(found))],
         "files": [str(p) for p in vars(files).values()], "report": str(report) if report is not None else None,
     }  # fmt: skip
     if json:
@@ -110,20 +113,27 @@ def shared(
         _say(told)
 
 
-def _compiled(model: Path | None) -> Any:
-    """A driver file as a compiled observer."""
+def _compiled(model: Path | None, speed: float) -> tuple[Program, list[Finding]]:
+    """A driver file as a compiled observer, and what is to be said of it at a speed, m/s."""
     from codriver.drivers.learned.driver_file import load_driver
     from codriver.drivers.learned.driver_observer import observer_of
     from codriver.errors import UsageError
+    from codriver.finding import Finding
     from codriver.program import compile as compile_observer
 
     if model is None:
         raise UsageError(
             "--assist predicted without --model", "a driver file",
             "learn one: codriver simulate circuit -o laps, then codriver driver fit laps/drive.csv --names laps/names.toml "
-            "-o anna.driver",
+            "--model ridge --signals steering_wheel_angle,road_curvature -o anna.driver",
         )  # fmt: skip
-    return compile_observer(observer_of(load_driver(model)))
+    known = load_driver(model)
+    at = [float(known.scaling.mean[k]) for k, f in enumerate(known.features) if f.signal == "longitudinal_speed"]
+    notes = []
+    if at and abs(speed / at[0] - 1) > OTHER_SPEED:
+        text = f"the driver model was learnt at {3.6 * at[0]:.0f} km/h on average, and drives at {3.6 * speed:.0f} km/h here"
+        notes.append(Finding("warn", f"{text}: what it foretells may be far off"))
+    return compile_observer(observer_of(known)), notes
 
 
 def _told(found: list[Any]) -> dict[str, Any]:

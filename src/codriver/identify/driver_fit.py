@@ -37,7 +37,7 @@ from codriver.signals import Log
 from codriver.signals.signal import Array
 
 ASKED = ("anticipation", "compensation", "lead", "lag", "delay", "reflex", "muscle")
-SEEN = ("near", "far")  # where he looks: given, never sought
+SEEN = ("near", "far")  # where he looks: sought only if asked for, since it takes much of what a drive tells
 WAYS = ("road", "direct", "dual-ekf")
 TWO_SPEEDS = 1.1  # ratio
 SPREAD = 0.5
@@ -53,6 +53,7 @@ def identify_driver(
     *,
     asked: Sequence[str] | None = None,
     held: Collection[str] = (),
+    also: Collection[str] = (),
     by: str = "road",
     spread: float = SPREAD,
 ) -> DriverFit:
@@ -64,6 +65,7 @@ def identify_driver(
             former: K_p and K_c are those for this K_r.
         asked: names of the parameters to identify; None for all of ASKED, and K_r where the drives' speeds differ by a tenth.
         held: names of the parameters that None leaves out, since they are known.
+        also: names that are sought beside: "near" and "far", where he looks. The dual filter cannot.
         by: "road", "direct" or "dual-ekf"; the last takes one drive.
         spread: standard deviation of the logarithms of the parameters asked for about those known.
 
@@ -78,7 +80,9 @@ def identify_driver(
         raise UsageError(
             f"by '{by}', spread {spread:g}", f"one of {', '.join(WAYS)}, and a positive spread", "choose one"
         )
-    seekable = [n for n in LETTERS if n not in SEEN]
+    seekable = [n for n in LETTERS if by != "dual-ekf" or n not in SEEN]
+    if any(n not in seekable for n in also):
+        raise UsageError(f"{', '.join(also)} by '{by}'", f"some of {', '.join(seekable)}", "choose among these")
     if asked is not None and (not asked or len(set(asked)) < len(asked) or any(n not in seekable for n in asked)):
         raise UsageError(
             f"asked for {', '.join(asked) or 'nothing'}", f"some of {', '.join(seekable)}, each once", "choose among these"
@@ -89,7 +93,7 @@ def identify_driver(
     for record in records:
         _refuse_rest(record)
     if asked is None:
-        asked = [n for n in (*ASKED, *_at_two_speeds(records)) if n not in held]
+        asked = [n for n in dict.fromkeys((*ASKED, *_at_two_speeds(records), *also)) if n not in held]
         if not asked:
             raise UsageError("every parameter is held", f"some of {', '.join(ASKED)} to be sought", "hold fewer")
     hidden = _hidden(records, known, tuple(asked))
@@ -171,7 +175,7 @@ def _left(records: Sequence[DriverRecord], best: TwoPointDriver) -> tuple[float,
     for r in records:
         use = slice(r.first, r.last)
         torque = r.torque[use]
-        off = torque - best.torque(r.near, r.far, r.angle, r.speed, r.dt)[use]
+        off = torque - best.torque(*r.seen(best.near, best.far), r.angle, r.speed, r.dt)[use]
         left, whole, rows = left + torque.size * off.var(), whole + torque.size * torque.var(), rows + torque.size
     return float(np.sqrt(left / rows)), float(1 - left / whole)
 

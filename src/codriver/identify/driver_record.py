@@ -39,17 +39,21 @@ class DriverRecord:
 
     Attributes:
         near, far, angle: theta_near, theta_far, delta_s, rad.
+        offset, heading: of the car from the path, m, rad.
         torque: T_dr, N m; curvature: rho, 1/m.
         speed: mean, m/s.
         dt: s.
         first, last: rows that count.
         summed: offset and heading error are sums, and everything went through the high-pass.
         source: of the log.
+        points: near, m, and far, s, of the two directions; `path` and `place`, where the car was on it, m, give those of others.
     """
 
     near: Array = field(repr=False)
     far: Array = field(repr=False)
     angle: Array = field(repr=False)
+    offset: Array = field(repr=False)
+    heading: Array = field(repr=False)
     torque: Array = field(repr=False)
     curvature: Array = field(repr=False)
     speed: float
@@ -58,6 +62,19 @@ class DriverRecord:
     last: int
     summed: bool
     source: str
+    points: tuple[float, float]
+    path: PathAhead = field(repr=False)
+    place: Array = field(repr=False)
+
+    def seen(self, near: float, far: float) -> tuple[Array, Array]:
+        """Directions of two points, rad: m ahead, and s ahead."""
+        if (near, far) == self.points:
+            return self.near, self.far
+        return self._direction(near), self._direction(far * self.speed)
+
+    def _direction(self, ahead: float) -> Array:
+        bend = self.path.bend(self.place, ahead)
+        return np.asarray((_quick(bend, self.dt) if self.summed else bend) - self.offset / ahead - self.heading)
 
 
 def driver_record(log: Log, near: float, far: float) -> DriverRecord:
@@ -101,19 +118,40 @@ def driver_record(log: Log, near: float, far: float) -> DriverRecord:
     else:
         y, psi = values["lateral_offset"], values["heading_error"]
     ahead = far * speed
-    seen = (
-        path.bend(place, near) - y / near - psi, path.bend(place, ahead) - y / ahead - psi,
-        values["steering_wheel_angle"], values["driver_torque"], rho,
+    near_angle, far_angle, angle, y, psi, torque, bent = (
+        _quick(x, dt) if summed else x
+        for x in (
+            path.bend(place, near) - y / near - psi, path.bend(place, ahead) - y / ahead - psi,
+            values["steering_wheel_angle"], y, psi, values["driver_torque"], rho,
+        )
     )  # fmt: skip
-    near_angle, far_angle, angle, torque, bent = seen
-    if summed:
-        from scipy.signal import butter, sosfilt
-
-        sections = butter(3, SLOW, "highpass", fs=1 / dt, output="sos")
-        near_angle, far_angle, angle, torque, bent = (np.asarray(sosfilt(sections, x), float) for x in seen)
     first = round((SETTLED + (0.5 / SLOW if summed else 0.0)) / dt)
     last = int(np.searchsorted(place, place[-1] - max(near, ahead, PREVIEW * speed)))
-    return DriverRecord(near_angle, far_angle, angle, torque, bent, speed, dt, first, last, summed, name)
+    return DriverRecord(
+        near_angle,
+        far_angle,
+        angle,
+        y,
+        psi,
+        torque,
+        bent,
+        speed,
+        dt,
+        first,
+        last,
+        summed,
+        name,
+        (near, far),
+        path,
+        place,
+    )
+
+
+def _quick(x: Array, dt: float) -> Array:
+    """What the high-pass leaves."""
+    from scipy.signal import butter, sosfilt
+
+    return np.asarray(sosfilt(butter(3, SLOW, "highpass", fs=1 / dt, output="sos"), x), float)
 
 
 def _known(signal: Signal, name: str) -> tuple[Array, Array]:

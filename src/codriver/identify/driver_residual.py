@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -37,11 +38,14 @@ def residual_of(records: Sequence[DriverRecord], known: TwoPointDriver, names: t
 
     sections = [butter(4, 0.4 / n * 2, output="sos") if n > 1 else None for n in (thinning(r.dt) for r in records)]
 
+    # A derivative moves one parameter: most of the time he looks where he did before.
+    looks = [lru_cache(maxsize=6)(record.seen) for record in records]
+
     def residual(theta: Array) -> tuple[Array, ...]:
         driver = driver_of(known, names, theta)
         found = []
-        for record, low in zip(records, sections, strict=True):
-            v = record.torque - driver.torque(record.near, record.far, record.angle, record.speed, record.dt)
+        for record, low, seen in zip(records, sections, looks, strict=True):
+            v = record.torque - driver.torque(*seen(driver.near, driver.far), record.angle, record.speed, record.dt)
             thin = (v if low is None else sosfilt(low, v))[record.first : record.last : thinning(record.dt)]
             found.append(np.asarray(thin - thin.mean()))
         return tuple(found)

@@ -106,7 +106,7 @@ class DriverFit:
     def torque(self, drive: int = 0) -> Array:
         """The torque of the driver found on a drive, from what he saw, N m, shape (n,)."""
         r = self.records[drive]
-        return self.best.torque(r.near, r.far, r.angle, r.speed, r.dt)
+        return self.best.torque(*r.seen(self.best.near, self.best.far), r.angle, r.speed, r.dt)
 
     def filed(self, name: str) -> FiledDriver:
         """The driver as a file holds him: told, given, or not told and why.

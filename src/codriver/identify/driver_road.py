@@ -2,10 +2,11 @@
 
     u^ = sum over lags of c_j rho(t - lag_j),  lags -PREVIEW .. PAST s            what he saw, as far as the road makes it
 
-theta_near, theta_far and delta_s hold the driver's own noise, since he sits in the loop: least squares of the torque is biased,
-however long the drive, unless the noise is modelled right. The road's curvature knows nothing of that noise. u^ is a projection
-on it, each block's by coefficients from the other blocks, so that it does not take up noise (split-sample instruments: Angrist,
-Krueger 1995, doi:10.1080/07350015.1995.10524589). The price is precision: what his noise would tell of him is not used.
+theta_near, theta_far and delta_s hold the driver's own noise, since he sits in the loop, and so do the car's offset and heading:
+least squares of the torque is biased, however long the drive, unless the noise is modelled right. The road's curvature knows
+nothing of that noise. u^ is a projection on it, each block's by coefficients from the other blocks, so that it does not take up
+noise (split-sample instruments: Angrist, Krueger 1995, doi:10.1080/07350015.1995.10524589). The price is precision: what his noise
+would tell of him is not used.
 """
 
 from __future__ import annotations
@@ -32,19 +33,19 @@ def by_the_road(record: DriverRecord) -> DriverRecord:
     rows = np.arange(max(record.first, past), min(record.last, n - ahead), thinning(dt))
     X = np.column_stack([*(smooth[rows - lag] for lag in lags), np.ones(rows.size)])
     edges = np.linspace(0, rows.size, _BLOCKS + 1).astype(int)
-    saw = np.stack([record.near, record.far, record.angle], axis=1)
+    saw = np.stack([record.near, record.far, record.angle, record.offset, record.heading], axis=1)
     XX = np.array([X[i:k].T @ X[i:k] for i, k in pairwise(edges)])
     Xu = np.array([X[i:k].T @ saw[rows[i:k]] for i, k in pairwise(edges)])
     made = np.empty_like(saw)
     for block in range(_BLOCKS):
         A = XX.sum(axis=0) - XX[block]
         c = np.linalg.solve(A + 1e-9 * np.trace(A) / A.shape[0] * np.eye(A.shape[0]), Xu.sum(axis=0) - Xu[block])
-        kernel = np.zeros((ahead + past + 1, 3))
+        kernel = np.zeros((ahead + past + 1, saw.shape[1]))
         kernel[lags + ahead] = c[:-1]
         first = 0 if block == 0 else rows[edges[block]]
         last = n if block == _BLOCKS - 1 else rows[edges[block + 1]]
-        for column in range(3):
+        for column in range(saw.shape[1]):
             made[first:last, column] = (
                 np.convolve(smooth, kernel[:, column])[ahead : ahead + n][first:last] + c[-1, column]
             )
-    return replace(record, near=made[:, 0], far=made[:, 1], angle=made[:, 2])
+    return replace(record, **dict(zip(("near", "far", "angle", "offset", "heading"), made.T, strict=True)))

@@ -61,7 +61,7 @@ def driver_findings(fit: DriverFit) -> tuple[Finding, ...]:
     found += [
         Finding(
             "warn",
-            f"the torque is no sensor's ({source}): the estimate's lag is in tau_p and T_N, its smoothness in K_t",
+            f"the torque is no sensor's ({source}): the estimate's lag and errors bias what is found",
         )
         for source in sorted(set(fit.estimated))
     ]
@@ -69,9 +69,10 @@ def driver_findings(fit: DriverFit) -> tuple[Finding, ...]:
         found.append(Finding("warn", "offset and heading error are summed from yaw rate and sideslip, behind a high-pass: slow "
                                      "corrections do not count"))  # fmt: skip
     given = ", ".join(f"{LETTERS[n][0]} {x:g} {LETTERS[n][1]}".removesuffix(" 1") for n, x in fit.given.items())
-    found.append(
-        Finding("ok", f"taken as given: {given}; the standard errors hold no doubt about these (docs/two-point.md)")
-    )
+    found.append(Finding("ok", f"taken as given: {given}; the standard errors hold no doubt about these"))
+    if "far" in fit.given and fit.by != "dual-ekf":
+        said = "where he looks is given: a far point that is a tenth off can halve K_c and T_I and double tau_p"
+        found.append(Finding("warn", f"{said}; seek near and far, too"))
     return tuple(found)
 
 

@@ -90,6 +90,7 @@ class EkfNoise:
         pitch: sd of theta', rad/s.
         tilt: sd of the pitch angle, rad, which turns p by W and r by phi' times itself, for `TILT_TIME` seconds.
         gyro_walk, accelerometer_walk: of the biases, rad/s and m/s^2 per sqrt(s).
+        share: systematic error of the roll in parts of it, which is told in its standard deviation and not carried.
         heave: error of the vertical acceleration of a lean, which springs take up, in parts of it, for `HEAVE_TIME` seconds.
         gyro, lateral_force, vertical_force, encoder: floors of the rows' sd, rad/s, m/s^2, rad, for errors that are independent at
             `RATE`.
@@ -106,6 +107,7 @@ class EkfNoise:
     pitch: float = 0.03
     gyro_walk: float = 0.0005
     accelerometer_walk: float = 1e-3
+    share: float = 0.015
     heave: float = 0.3
     tilt: float = 0.012
     gyro: float = 0.003
@@ -197,9 +199,10 @@ def motorcycle_ekf(
 
         bounded = [select(a > b, b, select(a < -b, -b, a)) for a, b in zip(done.x, BOUNDS, strict=True)]
         estimate = [select(active, a, 0.0) for a in bounded]
-        sds = [
-            select(active, sqrt(select(done.P[i][i] > 0, done.P[i][i], 0.0)), START[i]) for i in range(N)
-        ]  # fmt: skip
+        variances = [select(done.P[i][i] > 0, done.P[i][i], 0.0) for i in range(N)]
+        systematic = noise.share * estimate[ROLL]
+        variances[ROLL] = variances[ROLL] + systematic * systematic
+        sds = [select(active, sqrt(variance), sd) for variance, sd in zip(variances, START, strict=True)]
         lean = select(estimate[ROLL] < 0, -estimate[ROLL], estimate[ROLL])
         keep = both(active, both(all_came(came, NEEDED, GAP), lean < STEEPEST))
         inside = both(track["speed_known"], both(v >= low, v <= high))

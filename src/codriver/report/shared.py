@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from codriver.finding import Finding
 from codriver.report.document import BLACK, GREY, Chart, Curve, Document, Findings, Plot, Section, Table
 from codriver.simulate.shared_control import SharedDrive
 from codriver.simulate.shared_outcomes import FIGURES, Outcome, change_of, mean_outcome, verdict
@@ -20,8 +21,9 @@ _MAIN = ("offset", "heading", "torque", "power")
 
 
 def shared_document(
-    shared: SharedDrive, alone: SharedDrive, found: Mapping[str, Sequence[Outcome]], driver: str, command: str = ""
-) -> Document:
+    shared: SharedDrive, alone: SharedDrive, found: Mapping[str, Sequence[Outcome]], driver: str, command: str = "",
+    notes: Sequence[Finding] = (),
+) -> Document:  # fmt: skip
     """The report.
 
     Args:
@@ -29,13 +31,14 @@ def shared_document(
         found: by kind of assist, outcomes of the same drives; "none" among them.
         driver: who.
         command: that made it.
+        notes: what is to be said of the driver model.
     """
     assist, drives = shared.setting.assist, len(found["none"])
     return Document(
         "A steering wheel that two turn",
         f"{driver} drives round the circuit with an assist motor on the column: {_SAID[assist.kind]}.",
         (
-            *_compared(found),
+            *_compared(found, notes),
             Section("A drive", (_drive(shared, alone),)),
         ),
         (
@@ -48,11 +51,11 @@ def shared_document(
     )  # fmt: skip
 
 
-def _compared(found: Mapping[str, Sequence[Outcome]]) -> tuple[Section, ...]:
+def _compared(found: Mapping[str, Sequence[Outcome]], notes: Sequence[Finding]) -> tuple[Section, ...]:
     """Verdict and change, where there is an assist to compare; the table always."""
     if len(found) < 2:
         return (Section("Without", (_table(found),)),)
-    said = Findings(tuple((f.severity, f.text) for f in verdict(found)))
+    said = Findings(tuple((f.severity, f.text) for f in (*notes, *verdict(found))))
     return (
         Section("Verdict", (said, "Behind ±: the standard error over the drives, in pairs with the same seed.")),
         Section("With and without", (_table(found), _changes(found))),

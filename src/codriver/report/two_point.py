@@ -195,7 +195,7 @@ def _untold(fit: DriverFit) -> tuple[Part, ...]:
         ))  # fmt: skip
     taken = ", ".join(f"{n} ({LETTERS[n][0]}) {x:g} {LETTERS[n][1]}".removesuffix(" 1") for n, x in fit.given.items())
     parts.append(
-        f"Taken as given: {taken}. Where he looks is not sought. At one speed only K_r v + K_t shows, so K_p and K_c are those for "
+        f"Taken as given: {taken}. At one speed only K_r v + K_t shows, so K_p and K_c are those for "
         "the K_r given; drives at two speeds tell it."
     )
     return tuple(parts)
