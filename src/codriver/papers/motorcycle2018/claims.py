@@ -7,20 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from codriver.estimate import Estimate
-from codriver.observers.butterworth import butterworth_filter
-from codriver.observers.motorcycle_ts import motorcycle_ts_observer
-from codriver.observers.observer import chain
 from codriver.papers.item import Item
 from codriver.papers.motorcycle2018.compare import Compared
-from codriver.papers.motorcycle2018.methods import METHODS, compiled, lmi, program
-from codriver.papers.motorcycle2018.rides import DT, JUDGED, NOISE, SETTLE, WORDS, Scene, errors, sizes
+from codriver.papers.motorcycle2018.methods import FILTERED, METHODS, filtered, program
+from codriver.papers.motorcycle2018.rides import JUDGED, NOISE, SETTLE, WORDS, Scene, errors, sizes
 from codriver.papers.reproduction import Chapter
 from codriver.report.document import BLACK, Chart, Curve, Mark, Plot, Table
 from codriver.signals.grid import Flags
 
 LEVELS = (0.05, 0.075, 0.1)
 CUTOFFS = (2.0, 3.0, 5.0, 10.0, 20.0)  # Hz
-FILTERED = ("rider_torque", "front_lateral_force")
 CLOSE = 1.0  # deg
 LEFT = 8.0  # s of a ride behind a start
 DEGREE = 180 / np.pi
@@ -35,12 +31,12 @@ def claims_chapter(rides: Sequence[Scene], found: Compared) -> Chapter:
         found: judged.
     """
     hard = rides[-1]
-    levels, filtered = _levels(hard), _cutoffs(hard)
+    levels, cutoffs = _levels(hard), _cutoffs(hard)
     started = {name: _start(rides[0], name) for name in STARTED}
-    items = (*_affected(levels), _low_pass(hard, filtered), _arrives(started), _sideways(found, rides))
+    items = (*_affected(levels), _low_pass(hard, cutoffs), _arrives(started), _sideways(found, rides))
     return Chapter(
         "Noise, low-pass, starts (V)", (), (
-            _levels_table(levels, hard), _cutoff_table(filtered, hard), _start_chart(rides[0]),
+            _levels_table(levels, hard), _cutoff_table(cutoffs, hard), _start_chart(rides[0]),
         ), items,
     )  # fmt: skip
 
@@ -80,19 +76,18 @@ def _cutoffs(ride: Scene) -> dict[float, dict[str, tuple[float, float]]]:
     """By cut-off, 0 for none: RMSE of the filtered outputs, and what the noise alone does to them."""
     made = {}
     for cutoff in (0.0, *CUTOFFS):
-        observer = motorcycle_ts_observer(lmi())
-        whole = compiled(chain(observer, butterworth_filter(DT, FILTERED, cutoff)) if cutoff else observer)
+        whole = filtered(cutoff) if cutoff else program("fed")
         quiet, noisy = whole.run(ride.measures()), whole.run(ride.measures(1, NOISE))
         error, noise = errors(noisy, ride), _noise_of(noisy, quiet, quiet.time >= SETTLE)
         made[cutoff] = {name: (error[name], noise[name]) for name in FILTERED}
     return made
 
 
-def _low_pass(ride: Scene, filtered: dict[float, dict[str, tuple[float, float]]]) -> Item:
-    whole, noise = filtered[0.0]["rider_torque"]
-    kept = [c for c in CUTOFFS if filtered[c]["rider_torque"][0] <= 1.05 * whole]
-    best = min(kept or CUTOFFS, key=lambda c: filtered[c]["rider_torque"][1 if kept else 0])
-    error, left = filtered[best]["rider_torque"]
+def _low_pass(ride: Scene, found: dict[float, dict[str, tuple[float, float]]]) -> Item:
+    whole, noise = found[0.0]["rider_torque"]
+    kept = [c for c in CUTOFFS if found[c]["rider_torque"][0] <= 1.05 * whole]
+    best = min(kept or CUTOFFS, key=lambda c: found[c]["rider_torque"][1 if kept else 0])
+    error, left = found[best]["rider_torque"]
     return Item(
         "V.C: a third-order Butterworth filter denoises without significant delay", "sufficient",
         f"noise in the torque {noise:.2f} to {left:.2f} N m, error {whole:.1f} to {error:.1f} N m, at {best:g} Hz", "",
@@ -188,10 +183,10 @@ def _levels_table(levels: dict[float, dict[str, float]], ride: Scene) -> Table:
     )  # fmt: skip
 
 
-def _cutoff_table(filtered: dict[float, dict[str, tuple[float, float]]], ride: Scene) -> Table:
+def _cutoff_table(errors_at: dict[float, dict[str, tuple[float, float]]], ride: Scene) -> Table:
     rows: list[tuple[str | float | Mark | None, ...]] = [
         (f"{c:g} Hz" if c else "no filter", 1e3 * late_by(c) if c else 0.0, *(x for n in FILTERED for x in found[n]))
-        for c, found in filtered.items()
+        for c, found in errors_at.items()
     ]
     head = ("cut-off", "late, ms", "torque: error, N m", "of noise", "front force: error, N", "of noise")
     return Table(

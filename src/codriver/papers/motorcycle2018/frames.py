@@ -120,8 +120,8 @@ def frames_chapter(rides: Sequence[Scene]) -> Chapter:
              f"{WORDS[rides[-1].name]}, ideal sensors, IMU {centre[2]:.2f} m above the road in place of "
              f"{nominal_machine().imu[2]:.2f}: the sign hangs on how high it is, since what it takes to lean depends on that"),
         Item("(17): the root's argument is often negative", None, _listed(negative, ".0%"), "", min(negative.values()) > 0.1,
-             "not in the paper; share of ticks with f_y² + f_z² < g², ideal sensors: heave and pitch, which (16) leaves out, and a "
-             "falling or rising body. More than a tenth in each ride counts"),
+             "not in the paper; share of ticks with f_y² + f_z² < g², ideal sensors: heave and pitch, which (16) leaves out, "
+             "and a falling or rising body. More than a tenth in each ride counts"),
         Item("(19): the yaw rate by squares", "considered as measured", _listed(wide, ".1%"), "", max(wide.values()) <= 0.05,
              "RMS error over the rate's rms, ideal sensors; 5 % counts. With r / cos phi of a balanced turn "
              f"{_listed({n: f.off['W turn'] / f.off['W'] for n, f in ideal.items()}, '.1%')}; with noise "

@@ -13,6 +13,7 @@ import codriver.program as programs
 from codriver.models.lpv import LPV
 from codriver.models.motorcycle import MotorcycleParameters, motorcycle_model
 from codriver.models.motorcycle_lean import LeanParameters
+from codriver.observers.butterworth import butterworth_filter
 from codriver.observers.differentiator import algebraic_differentiator
 from codriver.observers.motorcycle_ekf import motorcycle_ekf
 from codriver.observers.motorcycle_family import WINDOW
@@ -29,6 +30,7 @@ from codriver.simulate.motorcycle.files import nominal_vehicle
 
 RANGE = (30 / 3.6, 110 / 3.6)  # m/s
 FLAGS = ("valid",)
+FILTERED = ("rider_torque", "front_lateral_force")
 
 
 @cache
@@ -133,6 +135,16 @@ def program(name: str) -> Program:
         name: of METHODS.
     """
     return compiled(METHODS[name].make())
+
+
+@cache
+def filtered(cutoff: float) -> Program:
+    """The LMI observer given measurements, torque and front force behind a Butterworth filter of third order.
+
+    Args:
+        cutoff: Hz.
+    """
+    return compiled(chain(motorcycle_ts_observer(lmi()), butterworth_filter(DT, FILTERED, cutoff)))
 
 
 def compiled(observer: Observer) -> Program:
