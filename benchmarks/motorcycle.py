@@ -98,7 +98,7 @@ def run(quick: bool = False) -> Iterator[Row]:
     count = 20_000 if quick else 200_000
     grid = ride(count)
     for name, case in cases().items():
-        yield from _slow(name, case, grid)
+        yield from _slow(name, case, grid, PART // 8 if quick else PART)
         if plain_c.compiler() is None:
             say("  no gcc: exported C left out")
         else:
@@ -106,14 +106,14 @@ def run(quick: bool = False) -> Iterator[Row]:
         yield _live(name, case, grid, CALLS // 10 if quick else CALLS)
 
 
-def _slow(name: str, case: Case, grid: Grid) -> Iterator[Row]:
+def _slow(name: str, case: Case, grid: Grid, part: int) -> Iterator[Row]:
     """Rows against what runs a sample at a time in Python."""
     count = len(grid)
     ours = measure(lambda: case.program.run_grid(grid), 5)
     made = case.program.run_grid(grid)
     sizes = SIZES if len(case.states) == len(SIZES) else np.concatenate([SIZES, np.ones(len(case.states) - len(SIZES))])
     found = np.column_stack([made[n] for n in case.states]) / sizes
-    rows = np.column_stack([grid.values[n] for n in case.channels])[:PART]
+    rows = np.column_stack([grid.values[n] for n in case.channels])[:part]
     title = f"{name}, {len(case.states)} states, {count} samples"
     for other, work in case.slow.items():
         say(f"  {title} against {other}")
