@@ -132,6 +132,11 @@ class TestVerdicts:
         items = tables_2018.tables_chapter(made_up({"fed": 9.0, "uio-fed": 4.0}, 1.5)).items
         assert [i.item for i in items if i.holds] == ["an unknown-input observer exists for (21)"]
 
+    def test_in_short(self):
+        said = tables_2018.in_short(made_up({"fed": 0.81, "paper": 12.0, "ts": 0.7, "ekf": 0.3}))
+        assert "errs by 0.84, 1.53, 1.55 degrees. Ours errs by 0.81, 0.81, 0.81" in said
+        assert said.endswith("by 0.30, 0.30, 0.30.")
+
     def test_best_has_sensors(self):
         """The observer that is given true measurements does not count."""
         assert made_up({"fed": 0.01, "kalman": 0.5}).best("slalom", "noise") == "kalman"

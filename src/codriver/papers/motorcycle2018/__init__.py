@@ -18,7 +18,7 @@ from codriver.papers.motorcycle2018.model import model_chapter
 from codriver.papers.motorcycle2018.rides import NOISE, RATE, WORDS, scene
 from codriver.papers.motorcycle2018.robustness import robustness_chapter
 from codriver.papers.motorcycle2018.steering import steering_chapter
-from codriver.papers.motorcycle2018.tables import tables_chapter
+from codriver.papers.motorcycle2018.tables import in_short, tables_chapter
 from codriver.papers.registry import PAPERS
 from codriver.papers.reproduction import Reproduction, Tell
 
@@ -63,7 +63,7 @@ def reproduce(
         "Every table, figure and claim of the paper beside what codriver finds. The paper's BikeSim rides and its machine's "
         "parameters were never published; in their place stand a nonlinear motorcycle of this project (Sharp's masses and "
         "tyres, with width, saturation, suspension, load transfer and a leaning rider) and three rides like those described. "
-        "The observer knows the linear model alone, as the paper's does.",
+        f"The observer knows the linear model alone, as the paper's does. {in_short(found)}",
         tuple(chapters),
         (("rides", ", ".join(f"{WORDS[r.name]} {r.record.ride.time[-1]:.0f} s" for r in rides)),
          ("readings of noisy sensors", str(seeds)), ("noise", f"{NOISE:.1%} of rms at {RATE} Hz")),

@@ -46,6 +46,25 @@ def tables_chapter(found: Compared) -> Chapter:
     )
 
 
+def in_short(found: Compared) -> str:
+    """The roll's errors with noise, in a sentence.
+
+    Args:
+        found: judged.
+    """
+
+    def told(method: str) -> str:
+        return ", ".join(f"{found.roll(method, ride, 'noise'):.2f}" for ride in found.zero)
+
+    rides, paper = ", ".join(WORDS[r] for r in found.zero), ", ".join(f"{PAPER[r][1]:.2f}" for r in found.zero)
+    return (
+        f"With noise ({rides}) the paper's roll errs by {paper} degrees. Ours errs by {told('fed')} where the observer is given "
+        "yaw rate and acceleration along the road as they are, as a simulator can; by "
+        f"{told('paper')} where these are made of what gyroscope and accelerometer show, by (17)-(20); by {told('ts')} with a = v W "
+        f"in place of (17); and an extended Kalman filter on the raw signals by {told('ekf')}."
+    )
+
+
 def _against(found: Compared) -> Table:
     """Table III beside ours."""
     shown = ("fed", "paper", "ts", "calm", "kalman", "ekf")
