@@ -59,9 +59,9 @@ def in_short(found: Compared) -> str:
     rides, paper = ", ".join(WORDS[r] for r in found.zero), ", ".join(f"{PAPER[r][1]:.2f}" for r in found.zero)
     return (
         f"With noise ({rides}) the paper's roll errs by {paper} degrees. Ours errs by {told('fed')} where the observer is given "
-        "yaw rate and acceleration along the road as they are, as a simulator can; by "
-        f"{told('paper')} where these are made of what gyroscope and accelerometer show, by (17)-(20); by {told('ts')} with a = v W "
-        f"in place of (17); and an extended Kalman filter on the raw signals by {told('ekf')}."
+        f"yaw rate and acceleration along the road as they are, as a simulator can; by {told('paper')} where these are made of "
+        f"what gyroscope and accelerometer show, by (17)-(20); by {told('ts')} with a = v W in place of (17); and an extended "
+        f"Kalman filter on the raw signals by {told('ekf')}."
     )
 
 
