@@ -154,7 +154,7 @@ class TestInfo:
         ran = run("info", demo_files.log, *can, "--json")
         told = ran.summary
         assert ran.err == ""
-        assert told["best"] == {"intent": "kinematic", "driver-torque": None}
+        assert told["best"] == {"intent": "kinematic", "driver-torque": None, "motorcycle": None}
         assert told["best_with_a_vehicle"]["intent"] == "intent-pedals"
         assert {s["name"] for s in told["signals"]} >= {*KEYS, "gear", "brake_pressure"}
         pedals = next(e for e in told["estimators"] if e["name"] == "intent-pedals")

@@ -127,6 +127,7 @@ def test_export_writes_c(laps: Path, tmp_path: Path) -> None:
         (("--model", "deep"), "kind 'deep'"), (("--protocol", "mine"), "--protocol mine"), (("--set", "alpha"), "NAME=VALUE"),
         (("--set", "layers=3"), "no parameter layers"), (("--horizon", "0.15"), "whole number of ticks"),
         (("-o", "anna.txt"), "ending in .driver"), (("--names", "none.toml"), "does not exist"),
+        (("--set", "alpha=-1"), "ridge with alpha = -1"), (("--model", "guarded", "--set", "trees=0"), "guarded with trees = 0"),
     ],
 )  # fmt: skip
 def test_misuse_is_said_before_anything_is_written(laps: Path, tmp_path: Path, words, said: str) -> None:
@@ -143,3 +144,71 @@ def test_a_drive_without_torque_says_what_to_do(laps: Path, tmp_path: Path) -> N
     with pytest.raises(CodriverError, match="no torque of the driver") as refused:
         CliRunner().invoke(app, ["driver", "fit", str(bare), "-o", str(tmp_path / "a.driver")], catch_exceptions=False)
     assert "torque sensor" in refused.value.do
+
+
+def test_a_recording_is_not_replaced_by_what_is_foretold_of_it(laps: Path, tmp_path: Path) -> None:
+    driver, drive = tmp_path / "anna.driver", tmp_path / "drive.csv"
+    ran("driver", "fit", laps / "anna.csv", *names(laps), "--model", "ridge", "-o", driver)
+    drive.write_bytes((laps / "anna2.csv").read_bytes())
+    with pytest.raises(CodriverError, match="the recording itself"):
+        ran("driver", "predict", driver, drive, *names(laps), "-o", drive)
+    assert drive.read_bytes() == (laps / "anna2.csv").read_bytes()
+
+
+def test_a_wrong_sign_is_told_when_foretelling_and_comparing(laps: Path, tmp_path: Path) -> None:
+    known = []
+    for who in ("anna", "carla"):
+        known.append(tmp_path / f"{who}.driver")
+        ran("driver", "fit", laps / f"{who}.csv", *names(laps), "--model", "ridge", "-o", known[-1])
+    wrong = tmp_path / "wrong.toml"
+    text = (laps / "anna" / "names.toml").read_text()
+    wrong.write_text(text.replace('source = "WheelAngle"', 'source = "WheelAngle"\nsign = -1'))
+    out = tmp_path / "out.csv"
+    for file, doubts in ((wrong, True), (laps / "anna" / "names.toml", False)):
+        words = (known[0], laps / "anna2.csv", "--names", file, "-o", out, "--json")
+        told = json.loads(ran("driver", "predict", *words))
+        assert bool(told["findings"]) == doubts
+    assert "none of these" in ran("driver", "compare", laps / "anna2.csv", *known, "--names", wrong)
+
+
+def test_a_name_is_shown_as_it_is(laps: Path, tmp_path: Path) -> None:
+    driver = tmp_path / "anna.driver"
+    ran("driver", "fit", laps / "anna.csv", *names(laps), "--model", "pwc", "--name", "anna [/b] [x]", "-o", driver)
+    said = ran("driver", "predict", driver, laps / "anna2.csv", *names(laps), "-o", tmp_path / "out.csv")
+    assert "anna [/b] [x] (pwc) on" in said
+
+
+def test_a_driver_of_a_leaking_protocol_says_so_when_he_foretells(laps: Path, tmp_path: Path) -> None:
+    driver, words = tmp_path / "anna.driver", ("--model", "ridge", "--protocol", "paper2019")
+    ran("driver", "fit", laps / "anna.csv", *names(laps), *words, "-o", driver)
+    assert "leak: " in ran("driver", "predict", driver, laps / "anna2.csv", *names(laps), "-o", tmp_path / "out.csv")
+
+
+def test_both_protocols_are_asked_for_the_same_horizon(laps: Path) -> None:
+    words = (laps / "anna.csv", *names(laps), "--model", "ridge", "--json", "--both")
+    near, far = (json.loads(ran("driver", "evaluate", *words, "--horizon", h)) for h in ("0.2", "1"))
+    for name in ("honest", "paper2019"):
+        stays = [told["protocols"][name]["models"]["pwc"]["rmse_Nm"] for told in (near, far)]
+        assert stays[1] > 1.5 * stays[0]
+
+
+def test_a_part_whose_torque_never_changes_is_told_and_does_not_stop_the_rest(laps: Path, tmp_path: Path) -> None:
+    still = tmp_path / "still.csv"
+    header, *rows = (laps / "anna.csv").read_text().splitlines()
+    place = header.split(",").index("WheelTorque")
+    quarter = range(len(rows) // 4 - 50, len(rows) // 2 + 50)
+    cells = [row.split(",") for row in rows]
+    for k in quarter:
+        cells[k][place] = "0"
+    still.write_text("\n".join([header, *(",".join(row) for row in cells)]) + "\n")
+    told = json.loads(ran("driver", "evaluate", still, *names(laps), "--model", "ridge", "--json"))
+    assert any("never changes in C" in finding["text"] for finding in told["findings"])
+
+
+def test_a_recording_given_twice_is_refused(laps: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.csv"
+    lines = (laps / "anna.csv").read_text().splitlines(keepends=True)
+    copy.write_text("".join(lines[: len(lines) * 3 // 4]))
+    for words in (("evaluate",), ("fit", "-o", tmp_path / "a.driver")):
+        with pytest.raises(CodriverError, match="are the same recording"):
+            ran("driver", *words, laps / "anna.csv", copy, *names(laps), "--model", "ridge")

@@ -76,6 +76,26 @@ def test_files_that_are_no_drivers_are_refused_by_what_is_wrong(tmp_path) -> Non
         parse_driver(json.dumps(fewer), "x.driver")
 
 
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        (("version",), 0, "version 0"), (("version",), True, "version True"), (("target",), "yaw_rate", "features"),
+        (("signals",), [], "features"), (("features", 0, 1), -0.03, "features"), (("features", 0, 2), "else", "features"),
+        (("protocol", "features", "history"), 2, "features"), (("scaling", "size", 0), 0.0, "scaling"),
+        (("scaling", "mean", 0), float("nan"), "NaN is no number"), (("calibration", "scale"), -1.0, "scale -1"),
+        (("calibration", "nu"), 2.0, "nu 2"),
+    ],
+)  # fmt: skip
+def test_an_edited_file_is_refused_and_not_foretold_with(place, value, said: str) -> None:
+    whole = json.loads(driver_text(small("ridge")))
+    inner = whole
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = value
+    with pytest.raises(FormatError, match=said):
+        parse_driver(json.dumps(whole), "x.driver")
+
+
 def with_road_ahead(log: Log, driver: LearnedDriver) -> Log:
     """The log with the road ahead as a map would give it, on the driver's tick."""
     setting = driver.protocol.features

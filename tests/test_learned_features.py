@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from codriver.drivers.learned.protocol import PROTOCOLS, Protocol, folds_of, tim
 from codriver.drivers.learned.road_ahead import curvature_ahead
 from codriver.drivers.learned.scaling import Scaling
 from codriver.drivers.learned.smoothing import local_quadratic, low_pass
+from codriver.drivers.learned.twice import refuse_twice
 from codriver.errors import LogError, MissingSignal, UsageError
 from codriver.signals import Log, Signal
 from driven import driven
@@ -189,3 +192,28 @@ def test_taking_rows_ends_stretches_where_rows_are_left_out() -> None:
     kept = table.take(np.r_[0:10, 20:30, table.lengths[0] - 5 : table.lengths[0] + 5])
     assert kept.lengths == (10, 10, 5, 5)
     assert np.array_equal(table.in_time().time, np.sort(table.time))
+
+
+def test_what_varies_less_than_any_sensor_tells_is_not_blown_up() -> None:
+    log = driven()
+    road = log["road_curvature"]
+    noise = 1e-14 * np.random.default_rng(0).standard_normal(len(road))
+    straight = log.with_signals(Signal("road_curvature", road.time, noise, road.unit, "a straight"))
+    scaling, bends = Scaling.of(features_of(straight)), features_of(log)
+    of_road = [k for k, f in enumerate(bends.features) if f.signal == "road_curvature"]
+    assert np.abs(scaling.features(bends.X)[:, of_road]).max() < 1.0
+
+
+def test_one_drive_by_the_clock_of_the_day_is_not_taken_twice() -> None:
+    day = 1.5e9
+
+    def at(log: Log, offset: float) -> Log:
+        return Log({n: replace(log[n], time=log[n].time + offset) for n in log})
+
+    one, other = driven("anna", seed=1), driven("anna", seed=2)
+    refuse_twice({"a": one, "b": other})
+    refuse_twice({"a": at(one, day), "b": at(other, day + 86400)})
+    with pytest.raises(UsageError, match="a and b are the same recording"):
+        refuse_twice({"a": at(one, day), "b": at(other, day + 5)})
+    with pytest.raises(UsageError, match="the same recording"):
+        refuse_twice({"a": one, "b": one.between(0, 60)})

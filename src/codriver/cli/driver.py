@@ -124,7 +124,7 @@ def evaluate(
         class_of(kind)
     check_report(report)
     first = protocol_of(protocol, horizon)
-    protocols = [first, *(protocol_of(n, None) for n in PROTOCOLS if both and n != first.name)]
+    protocols = [first, *(protocol_of(n, horizon) for n in PROTOCOLS if both and n != first.name)]
     parts = max(folds, len(drives)) * len({*BASELINES, *kinds}) * len(protocols)
     with working(not json, len(drives) + parts + 1) as stage:
         logs, notes = read_drives(drives, dbc, names, bus, vehicle, stage)

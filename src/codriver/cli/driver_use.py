@@ -47,17 +47,22 @@ def predict(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT", help="Result: .parquet, .csv or .mf4.", show_default=False)],
     dbc: Dbc = None, names: Names = None, bus: Bus = None, vehicle: VehicleName = None, json: Json = False,
 ) -> None:  # fmt: skip
-    """Foretell a drive's torque, row by row, with a 95 % band; each row knows its past and the road ahead only.
+    """Foretell a drive's torque, row by row, with a 95 % band; each row knows its past and the road ahead only
+    (not under the paper2019 protocol, and it says so).
 
     Example: codriver driver predict anna.driver friday.csv --names names.toml -o foretold.parquet
     """
     import numpy as np
+    from rich.markup import escape
 
-    from codriver.cli.terminal import console, working
+    from codriver.cli.estimate import refuse_recording
+    from codriver.cli.terminal import console, say_findings, working
     from codriver.drivers.learned.driver_file import load_driver
+    from codriver.drivers.learned.likeness import doubts_of
     from codriver.logs.write import Column, check_output, write_table
 
     check_output(out)
+    refuse_recording(out, drive)
     known = load_driver(driver)
     with working(not json, 2) as stage:
         logs, notes = read_drives([drive], dbc, names, bus, vehicle, stage)
@@ -76,6 +81,10 @@ def predict(
         "rmse_Nm": float(np.sqrt(np.mean(error**2))) if error.size else None,
         "stays_rmse_Nm": float(np.sqrt(np.mean((made.measured - made.last)[there] ** 2))) if error.size else None,
         "inside95": float(np.mean(((made.measured >= made.low) & (made.measured <= made.high))[there])) if error.size else None,
+        "findings": [
+            *({"severity": "bad", "text": f"leak: {leak}"} for leak in known.protocol.leaks),
+            *({"severity": f.severity, "text": f.text} for f in doubts_of(known, made)),
+        ],
         "notes": notes, "result": str(out),
     }  # fmt: skip
     if json:
@@ -83,7 +92,7 @@ def predict(
         return
     said = console()
     said.print(
-        f"[bold]{known.name}[/] ({known.kind}) on {drive.name}: {made.time.size} rows, {made.horizon:g} s ahead",
+        f"[bold]{escape(known.name)}[/] ({known.kind}) on {escape(drive.name)}: {made.time.size} rows, {made.horizon:g} s ahead",
         markup=True,
     )
     if error.size:
@@ -91,6 +100,7 @@ def predict(
             f"RMSE {told['rmse_Nm']:.3f} N m (the torque stays: {told['stays_rmse_Nm']:.3f}); {told['inside95']:.1%} lie in the "
             "95 % band"
         )
+    say_findings(said, told["findings"])
     for note in notes:
         said.print(f"  note {note}", markup=False)
     said.print(f"\nwrote {out}", markup=False)

@@ -80,12 +80,17 @@ def _models(e: Evaluation) -> dict[str, Any]:
     for kind in e.kinds:
         spread = e.spread(kind)
         made[kind] = {
-            "rmse_Nm": e.mean(kind), "rmse_se_Nm": spread if isfinite(spread) else None, "ratio_to_pwc": e.mean(kind, "ratio"),
-            "nrmse": e.mean(kind, "nrmse"), "inside68": e.mean(kind, "inside68"), "inside95": e.mean(kind, "inside95"),
+            "rmse_Nm": e.mean(kind), "rmse_se_Nm": _finite(spread), "ratio_to_pwc": e.mean(kind, "ratio"),
+            "nrmse": _finite(e.mean(kind, "nrmse")), "inside68": e.mean(kind, "inside68"), "inside95": e.mean(kind, "inside95"),
             "log_density": e.mean(kind, "log_density"), "fit_s": max(s.seconds for s in e.scores[kind]),
             "folds": [s.rmse for s in e.scores[kind]],
         }  # fmt: skip
     return made
+
+
+def _finite(value: float) -> float | None:
+    """None where there is no number, as JSON has it."""
+    return value if isfinite(value) else None
 
 
 def say_evaluation(told: dict[str, Any]) -> None:

@@ -38,10 +38,11 @@ def estimate(
     report: Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)] = None,
     json: Json = False,
 ) -> None:
-    """Estimate what the driver intends, or does at the steering wheel, from a recorded drive.
+    """Estimate what the driver intends, or does at the steering wheel, or how a motorcycle leans, from a recorded drive.
 
     Examples: codriver estimate intent drive.blf --dbc car.dbc --names names.toml --vehicle bisoffi2017 -o drive.parquet;
-    codriver estimate driver-torque drive.csv --names names.toml --vehicle wheel.toml -o torque.parquet
+    codriver estimate driver-torque drive.csv --names names.toml --vehicle wheel.toml -o torque.parquet;
+    codriver estimate motorcycle ride.csv --names names.toml --vehicle sharp1971 -o lean.parquet
     """
     estimate_file(estimator, log, out, vehicle, dbc, names, ell, rate, preset, form, bus, report, json)
 
@@ -99,13 +100,23 @@ def _check_outputs(out: Path, report: Path | None, log: Path) -> None:
     Raises:
         UsageError: they cannot, or the result would replace the recording.
     """
-    from codriver.errors import UsageError
     from codriver.logs.write import check_output
 
     check_output(out)
-    if out.exists() and out.samefile(log):
-        raise UsageError(f"-o {out} is the recording itself", "another name", "choose another -o; recordings are kept")
+    refuse_recording(out, log)
     check_report(report)
+
+
+def refuse_recording(out: Path, log: Path) -> None:
+    """Keep a result from replacing the recording that it is made of.
+
+    Raises:
+        UsageError: it would.
+    """
+    from codriver.errors import UsageError
+
+    if out.exists() and log.exists() and out.samefile(log):
+        raise UsageError(f"-o {out} is the recording itself", "another name", "choose another -o; recordings are kept")
 
 
 def check_report(report: Path | None) -> None:

@@ -46,8 +46,8 @@ EstimatorName = Annotated[
     str,
     typer.Argument(
         metavar="ESTIMATOR",
-        help="intent (intended acceleration and jerk) or driver-torque (at the steering wheel): the best the log can feed. Or one "
-        "of them: intent-pedals, ..., driver-torque-pi; codriver info LOG lists all.",
+        help="intent (intended acceleration and jerk), driver-torque (at the steering wheel) or motorcycle (lean, forces, rider's "
+        "torque): the best the log can feed. Or one of them: intent-pedals, ..., motorcycle-imu; codriver info LOG lists all.",
         show_default=False,
     ),
 ]

@@ -27,8 +27,9 @@ _FONT = {"family": "system-ui, 'Segoe UI', Helvetica, Arial, sans-serif", "size"
 def chart_figure(chart: Chart) -> dict[str, Any]:
     """Traces, layout and height of a chart, as JSON holds it."""
     legend_rows = max((_legend_rows(plot, chart.half) for plot in chart.plots), default=1)
-    # A legend of several rows stays below plotly's buttons.
-    top = TOP + (18 * legend_rows - 4 if legend_rows > 1 else 0)
+    # The toolbar has the right end of the legend's first row, or a row of its own.
+    crowded = any(_letters(plot) > (40 if chart.half else 115) for plot in chart.plots)
+    top = TOP + 18 * (legend_rows - 1 + crowded)
     words = _words(chart)
     bottom = BOTTOM + 16 * max((text.count("<br>") for text in words.values()), default=0)
     height = top + bottom + sum(p.height for p in chart.plots) + (GAP + top - TOP + 20) * (len(chart.plots) - 1)
@@ -83,8 +84,12 @@ def _words(chart: Chart) -> dict[str, str]:
 
 def _legend_rows(plot: Plot, half: bool) -> int:
     """How many rows the legend of a plot takes, about."""
-    letters = sum(len(c.name) + 7 for c in plot.curves if c.name)
-    return max(1, -(-letters // (70 if half else 150)))
+    return max(1, -(-_letters(plot) // (70 if half else 150)))
+
+
+def _letters(plot: Plot) -> int:
+    """How wide the legend of a plot is, in letters, about."""
+    return sum(len(c.name) + 7 for c in plot.curves if c.name)
 
 
 def _reach(chart: Chart) -> list[float]:

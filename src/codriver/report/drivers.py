@@ -18,6 +18,11 @@ FULL = {
     "gp": "Gaussian process (16)", "gmr": "GMR (23)", "hmm-gmr": "HMM-GMR (25)", "boosting": "boosted ridge",
     "guarded": "guarded (default)",
 }  # fmt: skip
+# All nine beside each other must be told apart.
+OF_KIND = {
+    "pwc": "#1A1A1A", "pwl": "#9A9A9A", "ridge": "#0072B2", "ann": "#E69F00", "gp": "#007A5A", "gmr": "#8E2F85",
+    "hmm-gmr": "#D58BC6", "boosting": "#7CC4EC", "guarded": "#C84C00",
+}  # fmt: skip
 SHOWN = 120.0  # s of a drive, at most, so that single movements can be seen
 
 
@@ -103,7 +108,7 @@ def driver_document(driver: LearnedDriver, drives: Mapping[str, Log], command: s
 def _bars(e: Evaluation) -> Chart:
     """RMSE by fold and model, as in figures 12, 14 and 16."""
     folds = [s.fold for s in e.scores["pwc"]]
-    curves = tuple(Curve(FULL[k], folds, np.array([s.rmse for s in e.scores[k]]), kind="bars") for k in e.kinds)
+    curves = tuple(Curve(FULL[k], folds, np.array([s.rmse for s in e.scores[k]]), OF_KIND[k], "bars") for k in e.kinds)
     return Chart(
         "Error on each part held out", "part held out", (Plot("RMSE (N m)", curves, 300),),
         "Lower is better. A part is foretold by models that learnt from all others.",
@@ -112,7 +117,7 @@ def _bars(e: Evaluation) -> Chart:
 
 def _means(e: Evaluation) -> Chart:
     """Mean RMSE by model with standard errors."""
-    names = [FULL[k] for k in e.kinds]
+    names = [FULL[k].replace(" (", "<br>(") for k in e.kinds]  # nine in a row are turned and cut off otherwise
     mean = np.array([e.mean(k) for k in e.kinds])
     error = np.nan_to_num(np.array([e.spread(k) for k in e.kinds]))
     curve = Curve("", names, mean, "#0072B2", "bars", low=mean - error, high=mean + error)
@@ -170,7 +175,7 @@ def _errors(driver: LearnedDriver) -> Chart:
     edges = np.linspace(-6, 6, 61)
     factor = np.sqrt(driver.calibration.nu / (driver.calibration.nu - 2))
     z = held.error / held.sd * factor
-    assumed = f"what the band assumes (Student, nu = {driver.calibration.nu:.1f})"
+    assumed = f"the band's, nu = {driver.calibration.nu:.1f}"
     density, _ = np.histogram(np.clip(z, -6, 6), edges, density=True)
     middle = (edges[1:] + edges[:-1]) / 2
     return Chart(
@@ -178,7 +183,7 @@ def _errors(driver: LearnedDriver) -> Chart:
             Curve("held-out errors", middle, density, GREY, "bars"),
             Curve(assumed, middle, t.pdf(middle, driver.calibration.nu), "#C84C00"),
         ), 220),),
-        "The grey bars should follow the line; then the band holds what it promises.", half=True,
+        "The grey bars should follow the line, a Student distribution; then the band holds what it promises.", half=True,
     )  # fmt: skip
 
 

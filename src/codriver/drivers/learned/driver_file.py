@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from codriver.drivers.learned.calibration import Calibration
-from codriver.drivers.learned.feature_setting import FeatureSetting
-from codriver.drivers.learned.features import Feature
+from codriver.drivers.learned.feature_setting import TARGETS, FeatureSetting
+from codriver.drivers.learned.features import Feature, columns_of
 from codriver.drivers.learned.kinds import class_of
 from codriver.drivers.learned.learned_driver import LearnedDriver
 from codriver.drivers.learned.protocol import Protocol
@@ -101,14 +101,14 @@ def parse_driver(text: str, where: str) -> LearnedDriver:
         FormatError: it is no driver file, or one of a later version.
     """
     try:
-        whole = json.loads(text)
-    except ValueError as error:
+        whole = json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
         raise FormatError(f"{where} is no JSON: {error}", _EXPECTED, "give such a file") from error
     if not isinstance(whole, dict) or whole.get("format") != FORMAT:
         raise FormatError(f"{where} holds no driver", _EXPECTED, "give such a file")
-    if not isinstance(whole.get("version"), int) or whole["version"] > VERSION:
+    if type(whole.get("version")) is not int or not 1 <= whole["version"] <= VERSION:
         raise FormatError(
-            f"{where} is of version {whole.get('version')}", f"version {VERSION} or older", "use a newer codriver"
+            f"{where} is of version {whole.get('version')}", f"version 1 to {VERSION}", "use a newer codriver"
         )
     try:
         return _driver(whole)
@@ -127,14 +127,31 @@ def _driver(whole: Mapping[str, Any]) -> LearnedDriver:
     scaling = Scaling.from_plain(whole["scaling"])
     if scaling.mean.shape != (len(features),) or scaling.size.shape != (len(features),):
         raise ValueError(f"{len(features)} features and a scaling of {scaling.mean.size}")
+    if not (np.all(scaling.size > 0) and scaling.torque_size > 0):
+        raise ValueError("a scaling by 0 or less")
+    signals, target = tuple(str(s) for s in whole["signals"]), str(whole["target"])
+    if target not in TARGETS or features != columns_of(protocol.features, signals, target):
+        raise ValueError("the features are not those of its settings and signals")
+    calibration = Calibration.from_plain(whole["calibration"])
+    if not (calibration.scale > 0 and calibration.nu > 2):
+        raise ValueError(f"a band of scale {calibration.scale:g}, nu {calibration.nu:g}")
     made = class_of(whole["kind"])().set_params(**{k: _tuples(v) for k, v in whole["model"]["parameters"].items()})
     made.restore(whole["model"]["state"])
     if getattr(made, "n_features_in_", len(features)) != len(features):
         raise ValueError(f"{len(features)} features and a model of {made.n_features_in_}")
     return LearnedDriver(
-        str(whole["name"]), str(whole["kind"]), protocol, tuple(whole["signals"]), str(whole["target"]), features, scaling,
-        made, Calibration.from_plain(whole["calibration"]), dict(whole["training"]), tuple(whole["left_out"]),
+        str(whole["name"]), str(whole["kind"]), protocol, signals, target, features, scaling,
+        made, calibration, dict(whole["training"]), tuple(whole["left_out"]),
     )  # fmt: skip
+
+
+def _refuse_constant(text: str) -> None:
+    """Keep NaN and infinities out, which JSON does not know.
+
+    Raises:
+        ValueError: always.
+    """
+    raise ValueError(f"{text} is no number")
 
 
 def _plain(value: Any) -> Any:

@@ -21,6 +21,7 @@ from codriver.drivers.learned.kinds import BASELINES, DEFAULT
 from codriver.drivers.learned.learned_driver import fit_table
 from codriver.drivers.learned.protocol import Fold, Protocol, folds_of
 from codriver.drivers.learned.scaling import Scaling
+from codriver.drivers.learned.twice import refuse_twice
 from codriver.finding import Finding
 from codriver.signals import Log
 from codriver.signals.signal import Array
@@ -34,8 +35,8 @@ class Score:
 
     Attributes:
         kind, fold: which.
-        rmse, nrmse: N m, and over the sd of the torque.
-        ratio: to "the torque stays".
+        rmse, nrmse: N m, and over the sd of the torque; NaN where that never changes.
+        ratio: to "the torque stays"; NaN where it does.
         inside68, inside95: shares of the torques inside the bands.
         log_density: mean.
         rows: judged.
@@ -89,7 +90,8 @@ class Evaluation:
             return float(np.sqrt(np.average(values**2, weights=rows)))
         if figure == "ratio":
             return self.mean(kind) / self.mean("pwc")
-        return float(np.average(values, weights=rows))
+        known = np.isfinite(values)
+        return float(np.average(values[known], weights=rows[known])) if known.any() else float("nan")
 
     def spread(self, kind: str, figure: str = "rmse") -> float:
         """Standard error of a figure's mean from its scatter over the folds; NaN with one fold."""
@@ -105,6 +107,11 @@ class Evaluation:
                 ", which the features hold" if worse else ""
             )
             found.append(Finding("bad" if worse else "warn", f"{'leak: ' if worse else ''}{said}"))
+        still = [s.fold for s in self.scores["pwc"] if not s.rmse > 0]
+        if still:
+            found.append(
+                Finding("warn", f"the torque never changes in {', '.join(still)}: no model can be judged there")
+            )
         if kind in self.scores:
             found += [self._against(kind, other) for other in BASELINES if other != kind and other in self.scores]
             inside = self.mean(kind, "inside95")
@@ -141,9 +148,10 @@ def evaluate(
     Raises:
         MissingSignal: a drive lacks the torque.
         LogError: there are too few usable rows.
-        UsageError: there is no such kind or parameter.
+        UsageError: there is no such kind or parameter, or two drives are the same recording.
     """
     protocol = protocol or Protocol()
+    refuse_twice(drives)
     table = features_of(list(drives.values()), protocol.features)
     return evaluate_table(
         table, folds_of(table, protocol, tuple(drives)), kinds, protocol=protocol, options=options, calibrate=calibrate,
@@ -178,8 +186,9 @@ def evaluate_table(
             rmse = float(np.sqrt(np.mean(error**2)))
             scores[kind].append(
                 Score(
-                    kind, fold.name, rmse, rmse / spread, rmse / stays, float(np.mean(np.abs(error) <= half[0.68])),
-                    float(np.mean(np.abs(error) <= half[0.95])), float(np.mean(made.log_density)), own.size, seconds,
+                    kind, fold.name, rmse, _over_size(rmse, spread), _over_size(rmse, stays),
+                    float(np.mean(np.abs(error) <= half[0.68])), float(np.mean(np.abs(error) <= half[0.95])),
+                    float(np.mean(made.log_density)), own.size, seconds,
                 )
             )  # fmt: skip
             blocks[kind].append(block_means(error**2, made.time, test.drive))
@@ -211,6 +220,11 @@ def block_means(values: Array, time: Array, drive: Index, length: float = BLOCK)
         full = count >= 0.5 * np.median(count[count > 0])
         found.append(sums[full] / count[full])
     return np.concatenate(found)
+
+
+def _over_size(error: float, size: float) -> float:
+    """An error over a size; NaN over none."""
+    return error / size if size > 0 else float("nan")
 
 
 def _over(calibration: Any, level: float) -> float:

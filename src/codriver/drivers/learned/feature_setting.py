@@ -82,7 +82,7 @@ class FeatureSetting:
         if abs(self.horizon / self.tick - self.ahead) > 1e-6 or self.ahead < 1:
             raise UsageError(
                 f"a horizon of {self.horizon:g} s with ticks of {self.tick:g} s", "a whole number of ticks",
-                "choose another horizon or other substeps",
+                f"choose a multiple of {self.tick:g} s, or other substeps",
             )  # fmt: skip
         if not 0 <= self.preview <= AHEAD * self.dt + 1e-9:
             raise UsageError(f"a preview of {self.preview:g} s", f"0 to {AHEAD * self.dt:g} s", "choose another")

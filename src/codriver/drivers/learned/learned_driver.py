@@ -7,7 +7,8 @@ What it was learnt from, and how it did on blocks it had not seen, goes with it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -19,7 +20,8 @@ from codriver.drivers.learned.kinds import DEFAULT, regressor_of
 from codriver.drivers.learned.protocol import Fold, Protocol, time_blocks
 from codriver.drivers.learned.regressor import TorqueRegressor
 from codriver.drivers.learned.scaling import Scaling
-from codriver.errors import LogError
+from codriver.drivers.learned.twice import refuse_twice
+from codriver.errors import LogError, UsageError
 from codriver.signals import Log
 from codriver.signals.signal import Array
 
@@ -151,10 +153,11 @@ def fit_driver(
     Raises:
         MissingSignal: a drive lacks the torque.
         LogError: there are too few usable rows.
-        UsageError: there is no such kind or parameter.
+        UsageError: there is no such kind or parameter, a parameter's value cannot be, or two drives are the same recording.
     """
     protocol = protocol or Protocol()
     logs = [drives] if isinstance(drives, Log) else list(drives)
+    refuse_twice({f"drive {k + 1} ({log.source or 'no source'})": log for k, log in enumerate(logs)})
     return fit_table(features_of(logs, protocol.features), kind, name=name, protocol=protocol, options=options)
 
 
@@ -179,11 +182,13 @@ def fit_table(
             f"{why} to learn a driver from", f"{LEAST_ROWS} rows or more, of a torque that changes", "add drives"
         )
     scaling = scaling or Scaling.of(table)
-    regressor = fitted(regressor_of(kind, table, protocol.features, options), scaling, table)
+    with _blaming(kind, options):
+        regressor = fitted(regressor_of(kind, table, protocol.features, options), scaling, table)
     folds = _calibration_folds(table, protocol)
     rows, means, sds = [], [], []
     for fold in folds if calibrate else []:
-        mean, sd = held_out(table, fold, kind, protocol, options)
+        with _blaming(kind, options):
+            mean, sd = held_out(table, fold, kind, protocol, options)
         rows.append(fold.test)
         means.append(mean)
         sds.append(sd)
@@ -208,6 +213,22 @@ def fit_table(
         name, kind, protocol, signals, table.target, table.features, scaling, regressor, calibration, training,
         table.left_out, held,
     )  # fmt: skip
+
+
+@contextmanager
+def _blaming(kind: str, options: Mapping[str, Any] | None) -> Iterator[None]:
+    """Values of parameters that a model refuses, as an error of the caller.
+
+    Raises:
+        UsageError: the model refuses.
+    """
+    try:
+        yield
+    except (ValueError, TypeError) as error:
+        if not options:
+            raise
+        given = ", ".join(f"{name} = {value}" for name, value in options.items())
+        raise UsageError(f"{kind} with {given}: {error}", "values that the model can take", "choose others") from error
 
 
 def _calibration_folds(table: FeatureTable, protocol: Protocol) -> list[Fold]:

@@ -5,7 +5,7 @@
 Neighbouring rows are nearly copies, so confidence is not the product of all densities, which would be certain of anything: blocks
 of 10 s are drawn with replacement, and the share of draws in which a driver is the likeliest is what is told. And the likeliest of
 several strangers is still a stranger: a driver is "like his own" only if the errors on this drive look like those of his own
-held-out blocks.
+held-out blocks (`likeness`).
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ import numpy as np
 
 from codriver.drivers.learned.evaluate import block_means
 from codriver.drivers.learned.learned_driver import LearnedDriver
+from codriver.drivers.learned.likeness import doubts_of
 from codriver.errors import LogError, UsageError
 from codriver.signals import Log
 
 DRAWS = 2000
 LEAST_BLOCKS = 6
-_STRANGE = 0.85  # share inside the 95 % band below which a drive does not look like this driver's
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def recognise(log: Log, drivers: Sequence[LearnedDriver], *, seed: int = 0) -> l
     common = np.unique(np.round(tables[0].time, 6))
     for table in tables[1:]:
         common = np.intersect1d(common, np.round(table.time, 6))
-    density, errors, inside = [], [], []
+    density, errors, inside, like = [], [], [], []
     time = common
     for driver, table in zip(drivers, tables, strict=True):
         made = driver.predict_table(table)
@@ -79,6 +79,7 @@ def recognise(log: Log, drivers: Sequence[LearnedDriver], *, seed: int = 0) -> l
         density.append(made.log_density[rows])
         errors.append(made.error[rows])
         inside.append(float(np.mean((made.measured >= made.low) & (made.measured <= made.high))))
+        like.append(not doubts_of(driver, made))
     drive = np.zeros(time.size, int)
     blocks = np.stack([block_means(d, time, drive) for d in density]) if time.size else np.empty((len(drivers), 0))
     if blocks.shape[1] < LEAST_BLOCKS:
@@ -97,7 +98,7 @@ def recognise(log: Log, drivers: Sequence[LearnedDriver], *, seed: int = 0) -> l
         found.append(
             Likeness(
                 driver.name, driver.kind, float(means[k]), float(means[best] - means[k]), float(low), float(high),
-                float(shares[k]), float(np.sqrt(np.mean(errors[k] ** 2))), inside[k], inside[k] >= _STRANGE,
+                float(shares[k]), float(np.sqrt(np.mean(errors[k] ** 2))), inside[k], like[k],
             )
         )  # fmt: skip
     return sorted(found, key=lambda one: -one.log_density)
@@ -115,5 +116,7 @@ def _refuse_unlike(drivers: Sequence[LearnedDriver]) -> None:
         for d in drivers
     }
     if len(asked) > 1:
-        what = "; ".join(f"{d.name}: {d.target} {d.protocol.features.horizon:g} s ahead" for d in drivers)
+        what = "; ".join(
+            f"{d.name}: {d.target} {d.protocol.features.horizon:g} s ahead, {d.protocol.name}" for d in drivers
+        )
         raise UsageError(f"drivers that foretell different things ({what})", "the same for all", "fit them alike")

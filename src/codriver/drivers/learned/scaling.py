@@ -15,7 +15,7 @@ import numpy as np
 from codriver.drivers.learned.features import FeatureTable
 from codriver.signals.signal import Array
 
-_LEAST = 1e-9  # of a column's largest value: less variation than that is rounding
+_LEAST = 1e-9  # SI units, and of a column's largest value: less variation than that is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,4 +71,4 @@ class Scaling:
 
 def _size(values: Array) -> float:
     size = float(values.std())
-    return size if size > _LEAST * max(float(np.abs(values).max(initial=0.0)), 1e-300) else 1.0
+    return size if size > _LEAST * max(float(np.abs(values).max(initial=0.0)), 1.0) else 1.0
