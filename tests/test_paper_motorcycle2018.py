@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+import codriver as cd
 from codriver.models.motorcycle import motorcycle_model
 from codriver.papers import PAPERS
 from codriver.papers.motorcycle2018 import reproduce
@@ -16,7 +17,8 @@ from codriver.papers.motorcycle2018.compare import SENSORS, Compared
 from codriver.papers.motorcycle2018.frames import framed, frames_chapter
 from codriver.papers.motorcycle2018.methods import METHODS, machine, program
 from codriver.papers.motorcycle2018.model import model_chapter
-from codriver.papers.motorcycle2018.rides import JUDGED, WORDS, errors, judged, scene, sizes
+from codriver.papers.motorcycle2018.rides import DT, JUDGED, WORDS, errors, judged, scene, sizes
+from codriver.papers.motorcycle2018.signed import signed_frame
 
 pytest.importorskip("cvxpy")
 SHORT = {"track": 18.0, "slalom": 9.0, "double-lane-change": 6.0}
@@ -104,6 +106,17 @@ class TestFrames:
         assert found(items, "a = v W is nearer").holds
         assert found(items, "(20)").holds
 
+    def test_signed_is_17_with_the_sign_of_the_yaw_rate(self, ride):
+        """By numpy from the IMU's signals; where the radicand is negative, 0."""
+        log = ride.log(1)
+        made = cd.compile(signed_frame(DT)).run(log)
+        f_y, f_z, q, r = (
+            log[n].values for n in ("lateral_acceleration", "vertical_acceleration", "pitch_rate", "yaw_rate")
+        )
+        expected = np.sign(r) * np.sqrt(np.maximum(f_y**2 + f_z**2 - 9.81**2, 0))
+        np.testing.assert_allclose(made.columns["lateral_acceleration"][: r.size], expected, atol=1e-12)
+        np.testing.assert_allclose(made.columns["yaw_rate"][: r.size], np.sign(r) * np.hypot(q, r), atol=1e-12)
+
 
 class TestVerdicts:
     """On made-up errors: those the paper tells of are borne out, others not."""
@@ -113,6 +126,7 @@ class TestVerdicts:
             {
                 "paper": 0.8,
                 "fed": 0.8,
+                "signed": 0.8,
                 "ts": 0.8,
                 "calm": 0.78,
                 "uio": 1.3,
@@ -133,7 +147,7 @@ class TestVerdicts:
         assert [i.item for i in items if i.holds] == ["an unknown-input observer exists for (21)"]
 
     def test_in_short(self):
-        said = tables_2018.in_short(made_up({"fed": 0.81, "paper": 12.0, "ts": 0.7, "ekf": 0.3}))
+        said = tables_2018.in_short(made_up({"fed": 0.81, "paper": 12.0, "signed": 0.9, "ts": 0.7, "ekf": 0.3}))
         assert "errs by 0.84, 1.53, 1.55 degrees. Ours errs by 0.81, 0.81, 0.81" in said
         assert said.endswith("by 0.30, 0.30, 0.30.")
 

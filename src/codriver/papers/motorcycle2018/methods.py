@@ -25,6 +25,7 @@ from codriver.observers.motorcycle_uio import design_motorcycle_uio, motorcycle_
 from codriver.observers.observer import Observer, chain
 from codriver.observers.road_frame import road_frame_observer
 from codriver.papers.motorcycle2018.rides import DT, JUDGED
+from codriver.papers.motorcycle2018.signed import signed_frame
 from codriver.program import Program
 from codriver.simulate.motorcycle.files import nominal_vehicle
 
@@ -78,10 +79,13 @@ def behind(observer: Observer, way: str = "turn", window: float = WINDOW) -> Obs
 
     Args:
         observer: takes the measurements of (21).
-        way: "squares", eq. (17) and (19), or "turn", a = v W.
+        way: "squares", eq. (17) and (19); "signed", the same with the yaw rate's sign; "turn", a = v W.
         window: of the differentiator, s.
     """
-    frame = road_frame_observer(observer.dt, "squares" if way == "squares" else "turn")
+    if way == "signed":
+        frame = signed_frame(observer.dt)
+    else:
+        frame = road_frame_observer(observer.dt, "squares" if way == "squares" else "turn")
     return chain(chain(frame, algebraic_differentiator(observer.dt, window)), observer, observer.name)
 
 
@@ -107,6 +111,8 @@ class Method:
 METHODS: dict[str, Method] = {
     "paper": Method("LMI observer, acceleration by (17), yaw rate by (19): the paper's", "LMI, (17)", "#C84C00",
                     lambda: behind(motorcycle_ts_observer(lmi()), "squares")),
+    "signed": Method("LMI observer, (17) with the sign of the yaw rate, (19)", "LMI, (17) signed", "#B8860B",
+                     lambda: behind(motorcycle_ts_observer(lmi()), "signed")),
     "fed": Method("LMI observer, given the measurements of (21) themselves", "LMI, fed", "#B0479B",
                   lambda: motorcycle_ts_observer(lmi()), fed=True),
     "ts": Method("LMI observer, a = v W", "LMI, a = v W", "#0072B2", lambda: behind(motorcycle_ts_observer(lmi()))),
