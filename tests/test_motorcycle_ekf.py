@@ -227,7 +227,7 @@ class TestDesign:
 
 @pytest.mark.slow
 class TestBounds:
-    """What is to hold with the paper's noise at 1 kHz on rides that nothing was tuned on: degrees, N m, N."""
+    """What is to hold with the paper's noise at 1 kHz, on rides that nothing was fitted to: degrees, N m, N."""
 
     @pytest.mark.parametrize(
         ("name", "roll", "torque", "force"),

@@ -69,8 +69,8 @@ FRESH = {
 
 
 def _lap() -> Scenario:
-    course = closed([(0.75 * length if angle else 1.2 * length, -angle) for length, angle in LAP])
-    return Scenario(course, for_bends(course, 40 / 3.6, 110 / 3.6, 6.5, start=60 / 3.6), 80.0)
+    course = closed([(1.2 * length if angle else length, -angle) for length, angle in LAP])
+    return Scenario(course, for_bends(course, 30 / 3.6, 110 / 3.6, 6.5, start=60 / 3.6), 80.0)
 
 
 def errors(

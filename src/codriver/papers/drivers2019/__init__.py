@@ -11,8 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from codriver.papers.drivers2019 import findings
+from codriver.papers.drivers2019.figure_15 import figure_15_chapter, identified
 from codriver.papers.drivers2019.figures import figure, means, ratios
-from codriver.papers.drivers2019.identified import figure_15_chapter, identified
 from codriver.papers.drivers2019.judge import HONEST, METHODS, PAPER, WITH_ROAD, Judged, judge
 from codriver.papers.drivers2019.recorded import recorded_chapters
 from codriver.papers.drivers2019.scenes import SCENES, human, observed
@@ -51,9 +51,9 @@ def reproduce(tell: Tell, quick: bool, recordings: Path | None) -> Reproduction:
     leak = leak_chapter(found["figure 14"], seeds["figure 14"])
     tell("figure 15, the driver identified")
     which = range(1, seeds["figure 14"] + 1)
-    figure_15 = figure_15_chapter(identified(which), which, found["figure 14"])
+    fifteen = figure_15_chapter(identified(which), which, found["figure 14"])
     first, second, third = (_figure_chapter(scene, found) for scene in SCENES)
-    chapters = (first, second, figure_15, third, leak, *recorded_chapters(recordings, tell))
+    chapters = (first, second, fifteen, third, leak, *recorded_chapters(recordings, tell))
     return Reproduction(
         "drivers2019",
         "Models of a driver's steering torque (2019, sections 2, 5 and 6), made again",
