@@ -67,6 +67,8 @@ def operations() -> list[list[str]]:
     car, machine, rows = _every_parameter(), cd.load_vehicle("sharp1971"), []
     for name, estimator in ESTIMATORS.items():
         vehicle = machine if estimator.family == "motorcycle" else _without(car, estimator.forbids)
+        if name == "bicycle-kalman":
+            vehicle = cd.load_vehicle("pasma2024")
         for form in estimator.forms:
             step = cd.build(name, vehicle, form=form).record()
             kinds = Counter(i.kind for i in step.instructions)

@@ -303,11 +303,11 @@ class TestDavis:
         first, second = (steer_record(log.between(*ends), 0.005) for ends in ((0, 30), (30, 60)))
         base = {"M_dd": 0.0, "M_dphi": 0.0, "C1_dphi": 0.0, "K0_dphi": 0.0, "K0_dd": 0.0}
         for learnt, judged, least in ((first, second, 0.94), (second, first, 0.955)):
-            row = fit_steer_row([learnt], {"K0_dd": -0.62}, by="torque").row
+            row = fit_steer_row([learnt], {"K0_dd": -0.77}, by="torque").row
             regression = fit_steer_row([learnt], base, by="torque").row
             truth = judged.torque[judged.used]
             whole, simple = (r2(r.torque(judged.motion)[judged.used], truth) for r in (row, regression))
             assert whole > least
             assert whole > simple > 0.9
             with pytest.raises(cd.errors.LogError, match="M_dd comes out as"):
-                fit_steer_row([learnt], {"K0_dd": -0.62})
+                fit_steer_row([learnt], {"K0_dd": -0.77})

@@ -33,12 +33,7 @@ STEER_BY_WIRE = BicycleParameters(
     IBxx=1.64, IBxz=0.654, IBzz=1.94, xH=0.944, zH=-0.595, mH=0.6, IHxx=0.0098, IHxz=-0.00044, IHzz=0.00396, rF=0.3498,
     mF=1.78, IFxx=0.0644, IFyy=0.1289,
 )  # fmt: skip
-# BicycleParameters 1.5.2 (Moore): bicycle Rigid with the rider Jason
-DAVIS = BicycleParameters(
-    w=1.064, c=0.06, lam=0.317489, rR=0.333, mR=4.9, IRxx=0.0701, IRyy=0.1293, xB=0.335361, zB=-1.097787, mB=83.5,
-    IBxx=9.0985, IBxz=-1.328876, IBzz=2.524203, xH=0.818, zH=-0.986, mH=5.4, IHxx=0.3439, IHxz=-0.0919, IHzz=0.1031,
-    rF=0.336, mF=1.6, IFxx=0.0524, IFyy=0.0984,
-)  # fmt: skip
+DAVIS = BicycleParameters.from_vehicle(cd.load_vehicle("moore2012"))  # frame and rider
 # Moore 2012, tables of chapter 12: identified from 374 runs of three riders; the paper's axes, K2_dphi and K2_pp are 0
 MOORE = SteerRow(-2.284, 0.2, 0.888, 1.7337, 3.918, -0.6678, 2.34)
 BASES = {

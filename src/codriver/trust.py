@@ -120,6 +120,15 @@ def check_estimate(
                 "time, more than any road: "
                 + ("is its axis, unit or sign right?" if always else "a slide, a crash, a bad sensor?"), _spans(steep, grid),
             ))  # fmt: skip
+    if (
+        "turn_measured" in values
+        and valid.any()
+        and (share := float(np.mean(values["turn_measured"][valid] < 0.5))) > 0.01
+    ):
+        findings.append(Finding(
+            "warn", f"no yaw rate for {share:.0%} of the valid time: the ride is taken to go straight on the average there, and "
+            "roll is wrong in a long bend; map yaw_rate if there is one",
+        ))  # fmt: skip
     findings += [*_driver(values, valid, grid), *pedals_move(log, grid.values)]
     findings += steering_findings(values, valid, grid, log)
     absurd = Log({name: log[name] for name in grid.values if name in log}).implausible()
@@ -182,7 +191,9 @@ def _rows(
         return [Finding("warn", "cannot be judged: no innovations among the outputs")] if there else []
     findings = []
     for row in rows:
-        findings += _row(row, valid, grid, ell, nis, lean)
+        # A sensor that the observer can do without, and that the log does not have.
+        if row.used.any() or np.isfinite(grid.values.get(row.row, np.zeros(1))).any():
+            findings += _row(row, valid, grid, ell, nis, lean)
     for output in outputs:
         if output.role == "innovation" and output.name not in values:
             findings.append(

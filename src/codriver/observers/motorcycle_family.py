@@ -6,21 +6,26 @@
 | motorcycle-kalman | Kalman filter on the linear model, balanced turn               | yes   | no    |
 | motorcycle-ts     | Takagi-Sugeno observer by LMI, differentiator, balanced turn   | no    | no    |
 | motorcycle-uio    | unknown-input observer, differentiator, balanced turn          | no    | no    |
+| bicycle-kalman    | Kalman filter on the Whipple bicycle, for vehicles with its parameters | yes | roll |
 | motorcycle-imu    | roll alone, from gyroscope and speed; needs no vehicle         | yes   | roll  |
 
 Signals are the IMU's, in body axes: roll_rate, pitch_rate and yaw_rate about the machine's own x, y and z, lateral_acceleration
 and vertical_acceleration along its own y and z. heading_rate, an output, is about the road's normal. In front of motorcycle-ts and
 motorcycle-uio measurements are turned into the road's frame (`road_frame`), and a differentiator makes the steer rate.
 
-Damon, Ichalal, Arioui 2018, and what it compares itself with.
+Damon, Ichalal, Arioui 2018, and what it compares itself with; Meijaard et al. 2007, doi:10.1098/rspa.2007.1857, for bicycles.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from codriver.models.bicycle import LETTERS as BICYCLE_LETTERS
+from codriver.models.bicycle import BicycleParameters
 from codriver.models.motorcycle import LETTERS, MotorcycleParameters, motorcycle_model
 from codriver.models.motorcycle_lean import LeanParameters
+from codriver.observers.bicycle_kalman import NEEDED as BICYCLE_NEEDED
+from codriver.observers.bicycle_kalman import bicycle_kalman
 from codriver.observers.differentiator import algebraic_differentiator
 from codriver.observers.motorcycle_ekf import NEEDED, motorcycle_ekf
 from codriver.observers.motorcycle_imu import crown_correction, motorcycle_imu
@@ -64,6 +69,12 @@ def _uio(vehicle: Vehicle | None, design: Design) -> Observer:
     assert vehicle is not None
     made = design_motorcycle_uio(motorcycle_model(MotorcycleParameters.from_vehicle(vehicle)), *RANGE, design.dt)
     return _of(vehicle, on_the_road(motorcycle_uio(made, design.dt)))
+
+
+def _bicycle(vehicle: Vehicle | None, design: Design) -> Observer:
+    assert vehicle is not None
+    friction = vehicle.number("steer_friction") if "steer_friction" in vehicle else 0.0
+    return _of(vehicle, bicycle_kalman(BicycleParameters.from_vehicle(vehicle), design.dt, friction=friction))
 
 
 def _imu(vehicle: Vehicle | None, design: Design) -> Observer:
@@ -121,6 +132,11 @@ register(Estimator(
 register(Estimator(
     "motorcycle-uio", PARAMETERS, CHAINED,
     "roll, tyre forces and rider's torque by an unknown-input observer, no bands", FAMILY, _uio, forms=("kalman",), varies=False,
+))  # fmt: skip
+register(Estimator(
+    "bicycle-kalman", tuple(BICYCLE_LETTERS.values()), (*BICYCLE_NEEDED, "longitudinal_speed"),
+    "roll and rider's torque of a bicycle, from steer angle, roll rate and speed; yaw rate if there", FAMILY, _bicycle,
+    forms=("kalman",), varies=False,
 ))  # fmt: skip
 register(Estimator(
     "motorcycle-imu", (), (*BALANCED[1:],), "roll alone from gyroscope and speed, the usual baseline", FAMILY, _imu,

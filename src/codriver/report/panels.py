@@ -252,7 +252,7 @@ def _slope(estimate: Estimate, truth: _Truth) -> Panel | None:
 def _innovations(estimate: Estimate) -> Panel | None:
     items = []
     for number, row in enumerate(estimate.innovations):
-        if row.sd is None:
+        if row.sd is None or not row.used.any():
             continue
         legend, color = ROWS.get(row.row, (words(row.row), OTHERS[number % len(OTHERS)]))
         carried_on = _carried_on(row.normalised(np.nan), round(HELD / estimate.grid.dt))
