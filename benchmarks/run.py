@@ -27,6 +27,7 @@ NAMES = (
     "batch",
     "smoother",
     "steering",
+    "motorcycle",
     "limits",
     "decode",
     "end_to_end",

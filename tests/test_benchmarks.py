@@ -8,11 +8,13 @@ import pytest
 from conftest import ROOT
 
 
-@pytest.mark.parametrize("name", ["kernel", "steering"])
+@pytest.mark.parametrize("name", ["kernel", "steering", pytest.param("motorcycle", marks=pytest.mark.slow)])
 def test_quick_run(name):
     """Some of them measure; nothing is written."""
-    if name == "steering":
+    if name != "kernel":
         pytest.importorskip("filterpy")
+    if name == "motorcycle":
+        pytest.importorskip("cvxpy")
     results = ROOT / "benchmarks" / "RESULTS.md"
     before = results.read_bytes() if results.exists() else b""
     command = [sys.executable, ROOT / "benchmarks" / "run.py", "--quick", "--only", name]

@@ -11,7 +11,11 @@ import typer
 def reproduce(
     papers: Annotated[
         list[str],
-        typer.Argument(metavar="PAPER...", help="jerk2017, jerk2015, steering2019, drivers2019.", show_default=False),
+        typer.Argument(
+            metavar="PAPER...",
+            help="jerk2017, jerk2015, steering2019, drivers2019, motorcycle2018.",
+            show_default=False,
+        ),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.")] = Path(),
     recordings: Annotated[
@@ -23,7 +27,7 @@ def reproduce(
 ) -> None:
     """Make a paper's tables, figures and claims again; DIR/PAPER.html is to be read, DIR/PAPER.json to be processed.
 
-    Example: codriver reproduce jerk2017 jerk2015 steering2019 drivers2019 -o papers
+    Example: codriver reproduce jerk2017 jerk2015 steering2019 drivers2019 motorcycle2018 -o papers
     """
     from codriver.papers import PAPERS
     from codriver.papers import reproduce as make

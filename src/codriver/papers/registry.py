@@ -22,6 +22,10 @@ PAPERS: dict[str, tuple[str, str]] = {
         "Okamoto, Tsiotras 2019, Robotics and Autonomous Systems",
     ),
     "drivers2019": ("codriver.papers.drivers2019", "Okamoto, Tsiotras 2019, Robotics and Autonomous Systems"),
+    "motorcycle2018": (
+        "codriver.papers.motorcycle2018",
+        "Damon, Ichalal, Arioui 2018, lateral motorcycle dynamics by a Luenberger-like LPV observer",
+    ),
     "jerk2015": ("codriver.papers.jerk2015", "Bisoffi, Biral, Da Lio, Zaccarian 2015, doi:10.1109/ITSC.2015.301"),
 }
 
