@@ -13,6 +13,7 @@ looked at, where the estimate is valid:
 * the accelerometer offset: more than 3 m/s^2 is no road;
 * pedals that go with the car and stay far below what a foot does: a unit that is too small;
 * a steering wheel's encoder and what is known to act on its column (`steering_trust.py`);
+* gyroscope, accelerometer and steer angle of a two-wheeler against each other (`motorcycle_trust.py`);
 * brake and known input: a brake that is always pressed, a powertrain that adds more than the vehicle shows;
 * used signals most of whose samples no vehicle can show: a unit or a scale is wrong.
 
@@ -30,6 +31,7 @@ import numpy.typing as npt
 
 from codriver.finding import Finding
 from codriver.innovations import Innovations, blocks, innovation_rows, row_name
+from codriver.motorcycle_trust import motorcycle_findings
 from codriver.observers.observer import Output
 from codriver.sensors_agree import pedals_move, sensors_agree
 from codriver.signals import Grid, Log
@@ -131,6 +133,7 @@ def check_estimate(
         ))  # fmt: skip
     findings += [*_driver(values, valid, grid), *pedals_move(log, grid.values)]
     findings += steering_findings(values, valid, grid, log)
+    findings += motorcycle_findings(values, valid, grid, log)
     absurd = Log({name: log[name] for name in grid.values if name in log}).implausible()
     findings += [Finding("bad" if fault in absurd else "warn", fault) for fault in log.faults]
     order = {"bad": 0, "warn": 1, "ok": 2}
