@@ -14,6 +14,7 @@ from codriver.identify.driver_fit import ASKED, identify_driver
 from codriver.identify.driver_record import driver_record
 from codriver.identify.driver_residual import whitened, whitening
 from codriver.identify.driver_road import by_the_road
+from codriver.identify.driver_signs import sign_findings
 from codriver.identify.driver_verdict import driver_findings
 from codriver.models.two_point import TwoPointDriver
 from codriver.simulate.circuit import CircuitSetting, simulate_circuit
@@ -298,6 +299,50 @@ class TestVerdict:
         sure = [abs(np.log(p.value / getattr(truth, p.name))) / (p.sd / p.value) for p in fit.parameters.values()]
         assert fit.explained > 0.95
         assert max(sure) > 3
+
+
+class TestSigns:
+    """What a fit explains away, or ends with none: signals that do not go together."""
+
+    @pytest.mark.parametrize(
+        ("name", "factor", "said"),
+        [
+            ("steering_wheel_angle", -1.0, "against the road's bends"),
+            ("steering_wheel_angle", np.pi / 180, "units of steering_wheel_angle"),
+            ("road_curvature", -1.0, "against the road's bends"),
+            ("driver_torque", -1.0, "against the wheel's angle"),
+            ("driver_torque", 1000.0, "no driver pulls"),
+            ("lateral_offset", -1.0, "against the heading error"),
+            ("heading_error", 180 / np.pi, "units of heading_error"),
+            ("longitudinal_speed", 1 / 3.6, "longitudinal_speed"),
+        ],
+    )
+    def test_wrong(self, clean, name, factor, said):
+        wrong = replace(clean[name], values=clean[name].values * factor)
+        log = cd.Log.of([wrong if n == name else clean[n] for n in clean], source="wrong")
+        found = sign_findings(driver_record(log, 6.0, 1.3))
+        assert any(f.severity == "bad" and said in f.text for f in found)
+
+    @pytest.mark.parametrize("kmh", [15.0, 30.0, 60.0])
+    @pytest.mark.parametrize("anticipation", ["far-point", "mpc"])
+    def test_right(self, kmh, anticipation):
+        car = replace(RigCar(), speed=kmh / 3.6)
+        setting = CircuitSetting(
+            CIRCUIT_DRIVERS["emma"], Variability(), anticipation, laps=1, direction="right", car=car
+        )
+        log = simulate_circuit(setting, seed=2).log()
+        for used in (log, without(log, "lateral_offset", "heading_error")):
+            assert not sign_findings(driver_record(used, 6.0, 1.3))
+
+    def test_a_fit_to_nothing_is_bad(self, clean):
+        wrong = replace(clean["road_curvature"], values=-clean["road_curvature"].values)
+        log = cd.Log.of([wrong if n == "road_curvature" else clean[n] for n in clean], source="wrong")
+        fit = identify_driver(log, held=("compensation", "lead", "lag", "delay", "muscle"))
+        assert any(f.severity == "bad" and "than a constant" in f.text for f in driver_findings(fit))
+
+    def test_nothing_left_of_the_drive(self, clean):
+        with pytest.raises(LogError, match="whose road ahead"):
+            driver_record(clean, 1e5, 1.3)
 
 
 class TestParts:

@@ -27,6 +27,7 @@ SETTLED = 10.0  # s from the start that are not used: the model starts from rest
 PREVIEW = 2.4  # s to the end that are not used: the road ahead is seen so far
 SLOW = 0.02  # Hz
 LEAST_SECONDS = 60.0
+LEAST_LEFT = 20.0  # s that count
 SLOWEST_RATE, FASTEST_RATE = 20.0, 200.0  # Hz
 LONGEST_HOLE = 0.5  # s
 LEAST_SPEED = 3.0  # m/s
@@ -127,6 +128,15 @@ def driver_record(log: Log, near: float, far: float) -> DriverRecord:
     )  # fmt: skip
     first = round((SETTLED + (0.5 / SLOW if summed else 0.0)) / dt)
     last = int(np.searchsorted(place, place[-1] - max(near, ahead, PREVIEW * speed)))
+    left = (last - first) * dt
+    if left < LEAST_LEFT:
+        unseen = max(near, ahead, PREVIEW * speed)
+        raise LogError(
+            f"{name}: {max(left, 0):.0f} s count, without {first * dt:.0f} s at the start, where the model settles, and the last "
+            f"{unseen:.0f} m, whose road ahead is not in the log",
+            f"at least {LEAST_LEFT:g} s",
+            "record a longer drive, or give near and far points that are not so far ahead",
+        )
     return DriverRecord(
         near_angle,
         far_angle,
@@ -172,7 +182,7 @@ def _ticks(stamps: Mapping[str, Array], rate: float, name: str) -> tuple[Array, 
         raise LogError(
             f"{name}: {max(end - start, 0):.0f} s of all signals, torque at {rate:.3g} Hz",
             f"at least {LEAST_SECONDS:g} s at {SLOWEST_RATE:g} Hz: a driver's delay is 0.1 s",
-            "record a longer drive, and faster",
+            "record a longer drive" if rate >= SLOWEST_RATE else "record the torque faster, and a minute of it",
         )
     holes = {n: float(np.diff(t[(t >= start) & (t <= end)]).max(initial=0.0)) for n, t in stamps.items()}
     if max(holes.values()) > LONGEST_HOLE:

@@ -1,6 +1,7 @@
 """What there is to say about the identification of a driver: what is told, how sure, and what was taken for granted.
 
     lags beyond = share of the autocorrelations of e, up to LAGS, outside +- 1.96 / sqrt(n)          0.05 if e is white
+    explained = 1 - var(v) / var(T_dr)
     alike = rms(v) / rms(e)         v: torque left unexplained, e: what of it the past does not foretell (`driver_residual`)
 
 A driver who is always the same leaves sensor noise, which is new each tick; one who varies leaves what lasts for seconds.
@@ -13,6 +14,7 @@ import numpy as np
 from codriver.finding import Finding
 from codriver.identify.driver_residual import residual_of
 from codriver.identify.driver_result import DriverFit
+from codriver.identify.driver_signs import sign_findings
 from codriver.identify.standard_errors import autocorrelation
 from codriver.models.two_point_file import LETTERS
 from codriver.signals.signal import Array
@@ -20,6 +22,7 @@ from codriver.signals.signal import Array
 LAGS = 2.0  # s
 WHITE = 0.1  # lags beyond
 LASTING = 3.0  # alike
+LEAST_EXPLAINED = 0.2  # explained
 
 
 def error_correlation(fit: DriverFit) -> tuple[Array, Array, float]:
@@ -47,7 +50,14 @@ def lasting(fit: DriverFit) -> float:
 
 def driver_findings(fit: DriverFit) -> tuple[Finding, ...]:
     """Judged sentences."""
-    found = [_told(fit)]
+    found = [_told(fit), *(f for r in fit.records for f in sign_findings(r))]
+    if fit.explained < LEAST_EXPLAINED:
+        found.append(
+            Finding(
+                "bad",
+                f"{_share(fit.explained)}: do not trust the values; look at signs and units, and at what is given",
+            )
+        )
     if fit.found is None:
         return tuple(found)
     if not fit.settled:
@@ -85,6 +95,12 @@ def _told(fit: DriverFit) -> Finding:
     if not told:
         return Finding("bad", f"{drives} none of {lacking}; record more, with more curves")
     return Finding("warn", f"{drives} {told}, not {lacking}; more minutes, curves or speeds tell more")
+
+
+def _share(explained: float) -> str:
+    if explained <= 0:
+        return "the driver found explains less of the torque than a constant would"
+    return f"the driver found explains {explained:.1%} of the torque"
 
 
 def _unsettled(fit: DriverFit) -> str:
