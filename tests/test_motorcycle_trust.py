@@ -79,5 +79,12 @@ def test_bias_that_is_not_found(log, vehicle):
     assert "nobody rolls over" in bad("motorcycle-uio", biased, vehicle)
 
 
+@pytest.mark.parametrize("zero", [0.5, -1.0])
+def test_zero_of_the_encoder(log, vehicle, zero):
+    d = log["steer_angle"]
+    off = log.with_signals(cd.Signal("steer_angle", d.time, d.values + zero * DEGREE, d.unit))
+    assert f"steer_angle is off its zero by {'-' if zero < 0 else ''}" in bad("motorcycle-uio", off, vehicle)
+
+
 def test_short_ride_is_not_judged(log, vehicle):
     assert "sign" not in bad("motorcycle-uio", scaled(log, -1, "yaw_rate").between(0, 5), vehicle)

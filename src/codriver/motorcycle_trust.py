@@ -7,6 +7,7 @@ Some estimators of this family have no innovations, and the innovations of the o
 * the roll rate follows the change of the lean that speed and yaw rate balance, sin phi = -v r / g;
 * the yaw rate follows speed times steer angle, by a length of the order of a wheelbase;
 * the pitch rate in bends is -v r^2 / g;
+* v delta = w r + v delta_0, by least squares: delta_0 is the steering encoder's zero, unless the estimator finds it;
 * no sensor shows the same all the time;
 * the roll rate adds up to nothing, since nobody rolls over.
 
@@ -38,6 +39,7 @@ AGAINST, LOOSE, WITH = -0.4, 0.3, 0.5  # correlations
 TIMES = 12.0  # roll rate and turn may differ by so much, degrees and radians by 57
 SHORT, LONG = 0.25, 12.0  # m, speed times steer angle over yaw rate; 1 to 4 in the rides we have
 UPWARDS = (0.75 * GRAVITY, 2.0 * GRAVITY)  # medians
+OFF, SURELY = 0.25 * np.pi / 180, 4.0  # rad, standard errors: the encoder's zero
 ROLLED, BIASED = 1.5, 2 * np.pi / 180  # rad, rad/s: roll rate added up, and its mean
 Values = Mapping[str, Array]
 
@@ -62,6 +64,7 @@ def motorcycle_findings(values: Values, valid: Flags, grid: Grid, log: Log) -> l
         *_still({name: column[moving] for name, column in columns.items() if name in used - {SPEED}}),
         *_gravity({name: column[moving] for name, column in columns.items()}, used),
         *_bends({name: _blocks(np.where(moving, column, np.nan)) for name, column in _with_turn(columns).items()}, used),
+        *_zero({name: _blocks(np.where(moving, column, np.nan)) for name, column in _with_turn(columns).items()}, values, used),
         *_rolled(columns["roll_rate"][moving], values, valid),
     ]  # fmt: skip
 
@@ -195,6 +198,27 @@ def _bends(blocks: dict[str, Array], used: set[str]) -> list[Finding]:
                 "pitch_rate is wrong: set sign = -1 in the names file",
             ))  # fmt: skip
     return findings
+
+
+def _zero(blocks: Values, values: Values, used: set[str]) -> list[Finding]:
+    """Whether the steering encoder is off its zero, with an estimator that takes it as it is."""
+    if "steer_angle" not in used or "steer_offset" in values or not {"course", "yaw_rate"} <= set(blocks):
+        return []
+    there = np.isfinite(blocks["course"]) & np.isfinite(blocks["yaw_rate"])
+    y, X = blocks["course"][there], np.column_stack([blocks["yaw_rate"], blocks[SPEED]])[there]
+    if y.size < LEAST or X[:, 0].std() < TURNING:
+        return []
+    normal = np.linalg.inv(X.T @ X)
+    fitted = normal @ X.T @ y
+    sd = float(np.sqrt(normal[1, 1] * np.sum((y - X @ fitted) ** 2) / (y.size - 2)))
+    zero = float(fitted[1])
+    if abs(zero) < max(OFF, SURELY * sd) or _goes_with(X[:, 0], y - zero * X[:, 1]) < 1 - LOOSE:
+        return []
+    return [Finding(
+        "bad",
+            f"steer_angle is off its zero by {zero * 180 / np.pi:.2g} deg, by speed and yaw rate in bends; a tenth of a degree "
+            "may cost a degree of roll: take it out by offset in the names file",
+    )]  # fmt: skip
 
 
 def _rolled(rate: Array, values: Values, valid: Flags) -> list[Finding]:
