@@ -11,7 +11,8 @@ import codriver as cd
 from codriver.errors import DesignError
 from codriver.models import MotorcycleParameters, motorcycle_model
 from codriver.observers.differentiator import algebraic_differentiator
-from codriver.observers.motorcycle_lmi import MotorcycleLMI, certify_gains, design_motorcycle_lmi
+from codriver.observers.lmi_certificate import certify_gains
+from codriver.observers.motorcycle_lmi import MotorcycleLMI, design_motorcycle_lmi
 from codriver.observers.motorcycle_ts import motorcycle_ts_observer
 from codriver.observers.observer import chain
 from codriver.observers.road_frame import road_frame_observer
