@@ -63,6 +63,7 @@ def shared(
     from codriver.cli.estimate import check_report
     from codriver.cli.simulate_circuit import car_at, who_drives
     from codriver.cli.terminal import command_line, working
+    from codriver.errors import UsageError
     from codriver.logs.write import complete_or_nothing
     from codriver.report.document import write_document
     from codriver.report.shared import shared_document
@@ -75,6 +76,10 @@ def shared(
     from codriver.simulate.shared_outcomes import compare_assists, verdict
     from codriver.simulate.variability import Variability
 
+    if model is not None and assist != "predicted":
+        raise UsageError(
+            f"--model with --assist {assist}", "--assist predicted", "leave --model out: it would not be used"
+        )
     refuse_foreign(out, "circuit", FILES)
     refuse_earlier(out, overwrite)
     check_report(report)
@@ -102,7 +107,8 @@ def shared(
                 write_document(shared_document(first, alone, found, driver, command_line(), notes), draft)
                 files = write_shared(out, first)
     told: dict[str, Any] = {
-        "driver": driver, "assist": assist, "gain": gain, "used_to_it": used_to_it, "drives": drives, "seed": seed,
+        "driver": driver, "assist": assist, "gain": gain if assist != "none" else None,
+        "used_to_it": used_to_it, "drives": drives, "seed": seed,
         "model": str(model) if model is not None else None, "outcomes": {k: _told(v) for k, v in found.items()},
         "findings": [{"severity": f.severity, "text": f.text} for f in (*notes, *verdict(found))],
         "files": [str(p) for p in vars(files).values()], "report": str(report) if report is not None else None,
@@ -159,7 +165,8 @@ def _say(told: dict[str, Any]) -> None:
 
     out = console()
     count = f"{told['drives']} drives, mean ± standard deviation" if told["drives"] > 1 else "1 drive"
-    out.print(f"{told['driver']}, {told['assist']} with gain {told['gain']:g}; {count}\n", markup=False)
+    helped = "no assist" if told["assist"] == "none" else f"{told['assist']} with gain {told['gain']:g}"
+    out.print(f"{told['driver']}, {helped}; {count}\n", markup=False)
     table = Table(box=None, pad_edge=False)
     table.add_column("")
     for name in told["outcomes"]:

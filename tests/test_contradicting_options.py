@@ -1,0 +1,25 @@
+"""Options that contradict each other or themselves are refused, not silently passed over."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from codriver.cli.app import app
+from codriver.cli.identify_driver import parse_known
+from codriver.errors import UsageError
+
+
+@pytest.mark.parametrize("text", ["K_p=4, K_p=5", "K_p=4, K_p=4"])
+def test_a_parameter_told_twice(text: str) -> None:
+    with pytest.raises(UsageError, match="K_p twice"):
+        parse_known(text)
+
+
+def test_a_model_that_no_assist_would_use(tmp_path: Path) -> None:
+    words = ["simulate", "shared", "-o", str(tmp_path / "out"), "--assist", "path", "--model", "anna.driver"]
+    done = CliRunner().invoke(app, words)
+    assert isinstance(done.exception, UsageError)
+    assert "--model with --assist path" in str(done.exception)
