@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from codriver.cli.app import app
 from codriver.cli.identify_driver import parse_known
+from codriver.cli.simulate_shared import _far_ahead
 from codriver.errors import UsageError
 
 
@@ -23,3 +24,10 @@ def test_a_model_that_no_assist_would_use(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, words)
     assert isinstance(done.exception, UsageError)
     assert "--model with --assist path" in str(done.exception)
+
+
+def test_a_model_that_foretells_far_ahead_is_told() -> None:
+    assert _far_ahead(0.2) == _far_ahead(0.3) == []
+    (found,) = _far_ahead(0.5)
+    assert found.severity == "warn"
+    assert "0.5 s ahead" in found.text

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
 Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.", show_default=False)]
 Driver = Annotated[
-    str, typer.Option("--driver", help="anna, ben, carla, david, emma, or a file of codriver identify driver (NAME.toml).")
+    str,
+    typer.Option("--driver", help="anna, ben, carla, david, emma, or a file of codriver identify driver (NAME.toml)."),
 ]
 Given = Annotated[
     str,

@@ -43,6 +43,7 @@ Drives = Annotated[
 ]
 Report = Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)]
 OTHER_SPEED = 0.05  # share by which a speed is another than the model's
+FAR_AHEAD = 0.3  # s, horizon of a model beyond which it is told
 
 
 def shared(
@@ -139,7 +140,19 @@ def _compiled(model: Path | None, speed: float) -> tuple[Program, list[Finding]]
     if at and abs(speed / at[0] - 1) > OTHER_SPEED:
         text = f"the driver model was learnt at {3.6 * at[0]:.0f} km/h on average, and drives at {3.6 * speed:.0f} km/h here"
         notes.append(Finding("warn", f"{text}: what it foretells may be far off"))
-    return compile_observer(observer_of(known)), notes
+    return compile_observer(observer_of(known)), [*notes, *_far_ahead(known.protocol.features.horizon)]
+
+
+def _far_ahead(horizon: float) -> list[Finding]:
+    """A warning where a model foretells further than an assist torque should lead the driver, s."""
+    from codriver.finding import Finding
+
+    if horizon <= FAR_AHEAD:
+        return []
+    text = (
+        f"the driver model foretells {horizon:g} s ahead: the motor turns the wheel that much before the driver would"
+    )
+    return [Finding("warn", f"{text}; learn one with --horizon {FAR_AHEAD:g} or less")]
 
 
 def _told(found: list[Any]) -> dict[str, Any]:
