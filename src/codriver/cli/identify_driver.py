@@ -110,7 +110,7 @@ def parse_known(text: str) -> tuple[TwoPointDriver, tuple[str, ...]]:
         text: "NAME=VALUE, ...", names or letters.
 
     Raises:
-        UsageError: it is not that, there is no such parameter, or a driver cannot have that value.
+        UsageError: it is not that, one is told twice, there is no such parameter, or a driver cannot have that value.
     """
     from dataclasses import replace
 
@@ -125,6 +125,8 @@ def parse_known(text: str) -> tuple[TwoPointDriver, tuple[str, ...]]:
             number = float(value)
         except ValueError:
             raise UsageError(f"--known {part}", "NAME=VALUE", 'write --known "K_r=0.15, far=1.2"') from None
+        if named(word.strip()) in values:
+            raise UsageError(f"--known tells {word.strip()} twice", "one value for a parameter", "leave one out")
         values[named(word.strip())] = number
     try:
         return replace(TwoPointDriver(), **values), tuple(values)

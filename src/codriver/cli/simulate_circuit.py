@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from codriver.finding import Finding
     from codriver.models.two_point import TwoPointDriver
+    from codriver.signals.signal import Array
     from codriver.simulate.rig import RigCar
 
 Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write into.", show_default=False)]
 Driver = Annotated[
-    str, typer.Option("--driver", help="anna, ben, carla, david, emma, or a file of codriver identify driver (TOML).")
+    str,
+    typer.Option("--driver", help="anna, ben, carla, david, emma, or a file of codriver identify driver (NAME.toml)."),
 ]
 Given = Annotated[
     str,
@@ -30,6 +33,8 @@ Ahead = Annotated[str, typer.Option("--anticipation", help="far-point, or mpc: a
 Direction = Annotated[str, typer.Option("--direction", help="left, right, or both: first left, then right.")]
 Speed = Annotated[float, typer.Option("--speed", help="km/h, held.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier simulation in that folder.")]
+
+LINEAR_TYRES = 8.0  # m/s2 sideways, from which linear tyres are told of
 
 
 def circuit(
@@ -50,7 +55,7 @@ def circuit(
 
     Example: codriver simulate circuit -o laps --driver ben
     """
-    from codriver.cli.terminal import console
+    from codriver.cli.terminal import console, say_findings
     from codriver.identify.regression import rms
     from codriver.simulate.circuit import CircuitSetting
     from codriver.simulate.circuit_files import FILES, write_circuit
@@ -72,6 +77,25 @@ def circuit(
         f"wrote {', '.join(str(p) for p in vars(files).values())}",
         markup=False,
     )
+    say_findings(
+        console(), [{"severity": f.severity, "text": f.text} for f in hard_bends(setting.car.speed, drive.curvature)]
+    )
+
+
+def hard_bends(speed: float, curvature: Array) -> list[Finding]:
+    """A warning where a path at a speed asks more of the tyres than a linear model tells.
+
+    Args:
+        speed: m/s.
+        curvature: of the path, 1/m.
+    """
+    from codriver.finding import Finding
+
+    asked = speed**2 * float(abs(curvature).max())
+    if asked < LINEAR_TYRES:
+        return []
+    text = f"the bends ask {asked:.1f} m/s2 sideways at {3.6 * speed:.0f} km/h, and the car's tyres are linear"
+    return [Finding("warn", f"{text}: no real car drives so from about {LINEAR_TYRES:g} m/s2")]
 
 
 def car_at(speed: float) -> RigCar:

@@ -43,6 +43,7 @@ Drives = Annotated[
 ]
 Report = Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)]
 OTHER_SPEED = 0.05  # share by which a speed is another than the model's
+FAR_AHEAD = 0.3  # s, horizon of a model beyond which it is told
 
 
 def shared(
@@ -63,6 +64,7 @@ def shared(
     from codriver.cli.estimate import check_report
     from codriver.cli.simulate_circuit import car_at, who_drives
     from codriver.cli.terminal import command_line, working
+    from codriver.errors import UsageError
     from codriver.logs.write import complete_or_nothing
     from codriver.report.document import write_document
     from codriver.report.shared import shared_document
@@ -75,6 +77,10 @@ def shared(
     from codriver.simulate.shared_outcomes import compare_assists, verdict
     from codriver.simulate.variability import Variability
 
+    if model is not None and assist != "predicted":
+        raise UsageError(
+            f"--model with --assist {assist}", "--assist predicted", "leave --model out: it would not be used"
+        )
     refuse_foreign(out, "circuit", FILES)
     refuse_earlier(out, overwrite)
     check_report(report)
@@ -102,7 +108,8 @@ def shared(
                 write_document(shared_document(first, alone, found, driver, command_line(), notes), draft)
                 files = write_shared(out, first)
     told: dict[str, Any] = {
-        "driver": driver, "assist": assist, "gain": gain, "used_to_it": used_to_it, "drives": drives, "seed": seed,
+        "driver": driver, "assist": assist, "gain": gain if assist != "none" else None,
+        "used_to_it": used_to_it, "drives": drives, "seed": seed,
         "model": str(model) if model is not None else None, "outcomes": {k: _told(v) for k, v in found.items()},
         "findings": [{"severity": f.severity, "text": f.text} for f in (*notes, *verdict(found))],
         "files": [str(p) for p in vars(files).values()], "report": str(report) if report is not None else None,
@@ -133,7 +140,19 @@ def _compiled(model: Path | None, speed: float) -> tuple[Program, list[Finding]]
     if at and abs(speed / at[0] - 1) > OTHER_SPEED:
         text = f"the driver model was learnt at {3.6 * at[0]:.0f} km/h on average, and drives at {3.6 * speed:.0f} km/h here"
         notes.append(Finding("warn", f"{text}: what it foretells may be far off"))
-    return compile_observer(observer_of(known)), notes
+    return compile_observer(observer_of(known)), [*notes, *_far_ahead(known.protocol.features.horizon)]
+
+
+def _far_ahead(horizon: float) -> list[Finding]:
+    """A warning where a model foretells further than an assist torque should lead the driver, s."""
+    from codriver.finding import Finding
+
+    if horizon <= FAR_AHEAD:
+        return []
+    text = (
+        f"the driver model foretells {horizon:g} s ahead: the motor turns the wheel that much before the driver would"
+    )
+    return [Finding("warn", f"{text}; learn one with --horizon {FAR_AHEAD:g} or less")]
 
 
 def _told(found: list[Any]) -> dict[str, Any]:
@@ -159,7 +178,8 @@ def _say(told: dict[str, Any]) -> None:
 
     out = console()
     count = f"{told['drives']} drives, mean ± standard deviation" if told["drives"] > 1 else "1 drive"
-    out.print(f"{told['driver']}, {told['assist']} with gain {told['gain']:g}; {count}\n", markup=False)
+    helped = "no assist" if told["assist"] == "none" else f"{told['assist']} with gain {told['gain']:g}"
+    out.print(f"{told['driver']}, {helped}; {count}\n", markup=False)
     table = Table(box=None, pad_edge=False)
     table.add_column("")
     for name in told["outcomes"]:
