@@ -18,10 +18,13 @@ Damon, Ichalal, Arioui 2018, and what it compares itself with; Meijaard et al. 2
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
+from codriver.errors import DesignError
 from codriver.models.bicycle import LETTERS as BICYCLE_LETTERS
 from codriver.models.bicycle import BicycleParameters
+from codriver.models.lpv import LPV
 from codriver.models.motorcycle import LETTERS, MotorcycleParameters, motorcycle_model
 from codriver.models.motorcycle_lean import LeanParameters
 from codriver.observers.bicycle_kalman import NEEDED as BICYCLE_NEEDED
@@ -30,7 +33,7 @@ from codriver.observers.differentiator import algebraic_differentiator
 from codriver.observers.motorcycle_ekf import NEEDED, motorcycle_ekf
 from codriver.observers.motorcycle_imu import crown_correction, motorcycle_imu
 from codriver.observers.motorcycle_kalman import motorcycle_kalman
-from codriver.observers.motorcycle_lmi import design_motorcycle_lmi
+from codriver.observers.motorcycle_lmi import MotorcycleLMI, design_motorcycle_lmi
 from codriver.observers.motorcycle_ts import motorcycle_ts_observer
 from codriver.observers.motorcycle_uio import design_motorcycle_uio, motorcycle_uio
 from codriver.observers.observer import Observer, Scalars, chain
@@ -45,6 +48,9 @@ CHAINED = ("longitudinal_speed", "yaw_rate", "steer_angle", "roll_rate")  # the 
 RANGE = (8.0, 45.0)  # m/s, of the observers by LMI and of the unknown input
 RATE = 100.0  # Hz, at which errors of the balanced turn are independent, however often it is sampled
 WINDOW = 0.04  # s, of the differentiator in front of them
+# Of the design by LMI: a = v W errs by all that is out of balance, far more than a gyroscope does; with less trust in it and slow
+# poles the roll comes from the rates. The tyres' own poles v / sigma bound the disc from below: the narrowest that can be is taken.
+UNBALANCED, SLOWEST, DISCS = 0.7, 0.1, (160.0, 200.0, 250.0, 300.0)  # m/s^2, 1/s, rad/s
 
 
 def _ekf(vehicle: Vehicle | None, design: Design) -> Observer:
@@ -61,8 +67,31 @@ def _kalman(vehicle: Vehicle | None, design: Design) -> Observer:
 def _ts(vehicle: Vehicle | None, design: Design) -> Observer:
     assert vehicle is not None
     model = motorcycle_model(MotorcycleParameters.from_vehicle(vehicle)).with_walking_inputs()
-    made = design_motorcycle_lmi(model, *RANGE, design.dt, rate=min(RATE, 1 / design.dt))
-    return _of(vehicle, on_the_road(motorcycle_ts_observer(made)))
+    return _of(vehicle, on_the_road(motorcycle_ts_observer(design_for_balance(model, design.dt))))
+
+
+def design_for_balance(model: LPV, dt: float) -> MotorcycleLMI:
+    """Gains by LMI for a lateral acceleration that is made of speed and yaw rate.
+
+    Args:
+        model: `motorcycle_model(p).with_walking_inputs()`.
+        dt: tick, s.
+
+    Raises:
+        DesignError: no such observer, in the widest region either.
+        UsageError: cvxpy is not installed.
+    """
+
+    def within(fastest: float) -> MotorcycleLMI:
+        return design_motorcycle_lmi(
+            model, *RANGE, dt, slowest=SLOWEST, fastest=fastest, rate=min(RATE, 1 / dt),
+            sensors={"lateral_acceleration": UNBALANCED},
+        )  # fmt: skip
+
+    for fastest in DISCS[:-1]:
+        with suppress(DesignError):
+            return within(fastest)
+    return within(DISCS[-1])
 
 
 def _uio(vehicle: Vehicle | None, design: Design) -> Observer:

@@ -15,7 +15,7 @@ sizes are alike.
 
 `certified` is 1 where v is in the range that the certificate is of. Outside the estimate goes on, promised by nobody. `valid` is 1
 where it is certified, all measurements are there, and as many seconds have passed since they were not as the slowest pole needs to
-take an error to a hundredth.
+take an error to a twentieth.
 
 Measurements are inputs, in the road's frame, so that a differentiator and `road_frame_observer` can be chained in front.
 Damon, Ichalal, Arioui 2018, eq. (21)-(23), (35).
@@ -35,7 +35,7 @@ from codriver.signals.signal import Array
 EXACT = 1e-9  # of the transition, beside scipy's matrix exponential, at speeds to a quarter beyond the range
 PARTS, TERMS = 32, 20  # at most
 LARGEST = 1e6  # state, in the design's units: where nothing is certified it may grow, but not overflow
-SETTLED = 100.0  # an error falls to this fraction before `valid`
+SETTLED = 20.0  # an error falls to this part before `valid`
 
 
 def motorcycle_ts_observer(design: MotorcycleLMI) -> Observer:

@@ -20,7 +20,7 @@ CUTOFFS = (2.0, 3.0, 5.0, 10.0, 20.0)  # Hz
 CLOSE = 1.0  # deg
 LEFT = 8.0  # s of a ride behind a start
 DEGREE = 180 / np.pi
-STARTED = ("ts", "calm", "kalman", "ekf")
+STARTED = ("ts", "shipped", "kalman", "ekf")
 
 
 def claims_chapter(rides: Sequence[Scene], found: Compared) -> Chapter:

@@ -23,7 +23,7 @@ VARIATIONS: dict[str, tuple[dict[str, float], dict[str, float]]] = {
     "speed 2 % high": ({}, {"speed_error": 0.02}), "speed 5 % low": ({}, {"speed_error": -0.05}),
     "biases": ({}, {"bias": 1.0}), "twice the biases": ({}, {"bias": 2.0}),
 }  # fmt: skip
-SHOWN = ("ts", "calm", "kalman", "uio", "imu", "ekf")
+SHOWN = ("ts", "shipped", "kalman", "uio", "imu", "ekf")
 NOMINAL = "as designed"
 
 

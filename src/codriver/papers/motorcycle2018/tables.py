@@ -34,7 +34,7 @@ def tables_chapter(found: Compared) -> Chapter:
         f"{SETTLE:g} s on.",
         "The paper's observer stands first, behind (17) and (19); then the same given the measurements of (21) themselves, as "
         "a simulator can but no sensor does: noise is then 7.5 % of each one's largest value. In the rows below a = v W takes "
-        "the place of (17). “Calm” was chosen with these rides at hand, which flatters it.",
+        "the place of (17). “Shipped” was chosen with these rides at hand, which flatters it.",
     )
     names = ("roll_angle", "rider_torque", "front_lateral_force", "rear_lateral_force", "lateral_velocity")
     items = (*_third(found), *_second(found), *_said(found), *_beside(found))
@@ -67,7 +67,7 @@ def in_short(found: Compared) -> str:
 
 def _against(found: Compared) -> Table:
     """Table III beside ours."""
-    shown = ("fed", "paper", "signed", "ts", "calm", "kalman", "ekf")
+    shown = ("fed", "paper", "signed", "ts", "shipped", "kalman", "ekf")
     rows = [
         (WORDS[ride], "ideal" if k == 0 else "real", PAPER[ride][k], *(found.roll(m, ride, kind) for m in shown))
         for ride in found.zero for k, kind in enumerate(KINDS)
@@ -91,7 +91,7 @@ def _third(found: Compared) -> tuple[Item, ...]:
                 Item(f"table III: roll, {where}, from what sensors show by (17)-(20)", PAPER[ride][k], value, "deg", value <= limit,
                      f"the same observer behind (17) and (19); at most {ALIKE:g} times the paper's figure counts. With the yaw "
                      f"rate's sign in (17) {found.roll('signed', ride, kind):.2f}, with a = v W "
-                     f"{found.roll('ts', ride, kind):.2f}, calm {found.roll('calm', ride, kind):.2f}, answering zero "
+                     f"{found.roll('ts', ride, kind):.2f}, shipped {found.roll('shipped', ride, kind):.2f}, answering zero "
                      f"{found.zero[ride]['roll_angle']:.1f}"),
             ]  # fmt: skip
     return tuple(made)
@@ -172,10 +172,10 @@ def _beside(found: Compared) -> tuple[Item, ...]:
         "counts; the paper has " + ", ".join(f"{PAPER[r][1]:.2f}" for r in found.zero),
     ))  # fmt: skip
     for ride in found.zero:
-        value = found.roll("calm", ride, "noise")
+        value = found.roll("shipped", ride, "noise")
         made.append(Item(
             f"the LMI observer can reach table III, {WORDS[ride]}", None, value, "deg", value <= PAPER[ride][1],
-            f"not in the paper; calm poles, a = v W, noisy sensors; at most the paper's {PAPER[ride][1]:g} counts",
+            f"not in the paper; slower poles, a = v W, noisy sensors; at most the paper's {PAPER[ride][1]:g} counts",
         ))  # fmt: skip
     torque = {
         ride: found.errors["ekf", ride, "noise"]["rider_torque"] / z["rider_torque"] for ride, z in found.zero.items()
