@@ -195,7 +195,7 @@ def test_exported(name, form, real, tmp_path):
 @pytest.mark.parametrize(
     ("name", "slalom", "lane_change", "torque"),
     [
-        ("motorcycle-kalman", 0.5, 0.5, 8), ("motorcycle-ts", 1.1, 0.9, 8), ("motorcycle-uio", 1.6, 1.7, 10),
+        ("motorcycle-kalman", 0.5, 0.5, 8), ("motorcycle-ts", 0.5, 0.4, 10), ("motorcycle-uio", 1.6, 1.7, 10),
         ("motorcycle-imu", 1.5, 1.8, None),
     ],
 )  # fmt: skip

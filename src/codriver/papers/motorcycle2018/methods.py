@@ -65,7 +65,7 @@ def lmi(fastest: float | None = 300.0, scheduled: bool = True) -> MotorcycleLMI:
 
 @cache
 def shipped_lmi() -> MotorcycleLMI:
-    """That of the estimator `motorcycle-ts`: slower poles, and told that a = v W may be 0.7 m/s^2 off; chosen on rides like these."""
+    """That of the estimator `motorcycle-ts`: slower poles, told that a = v W may be 0.7 m/s^2 off; chosen on rides like these."""
     return design_for_balance(model(), DT)
 
 
