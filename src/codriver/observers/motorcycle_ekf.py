@@ -61,8 +61,7 @@ NEEDED = tuple(name for name in (*ROWS, SPEED) if name not in OPTIONAL)
 # The states in their order, by the names of the outputs.
 STATES = (
     "roll_angle", "steer_angle", "lateral_velocity", "heading_rate", "roll_rate", "steer_rate", "front_lateral_force",
-    "rear_lateral_force", "rider_torque", "roll_moment", "pitching", *(f"{row}_bias" for row in IMU),
-    "steer_offset",
+    "rear_lateral_force", "rider_torque", "roll_moment", "pitching", *(f"{row}_bias" for row in IMU), "steer_offset",
 )  # fmt: skip
 OWN = {"steer_offset": "what steer_angle shows straight ahead"}
 N, MOVING, LEAN = len(STATES), 8, len(LEAN_STATES)
@@ -258,13 +257,8 @@ def _sensor_function(p: LeanParameters) -> Scalar:
     side = a[0] + v * W + X * a[1] - Z * swing - n * lift + W * W * (Z * S - n * C)
     up = (rho - Z) * lift + n * swing + g
     rows = ca.vertcat(
-        w + b[0],
-        x[PITCHING] + W * S + b[1],
-        W * C + b[2],
-        side * C + up * S + b[3],
-        up * C - side * S + b[4],
-        x[1] + b[5],
-    )
+        w + b[0], x[PITCHING] + W * S + b[1], W * C + b[2], side * C + up * S + b[3], up * C - side * S + b[4], x[1] + b[5],
+    )  # fmt: skip
     H = ca.jacobian(rows, x)
     H[:, ROLL] += ca.jacobian(rows, S) * C - ca.jacobian(rows, C) * S
     H[:, :LEAN] += ca.jacobian(rows, a) @ bent
