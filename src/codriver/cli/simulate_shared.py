@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from codriver.cli.options import Json
-from codriver.cli.simulate_circuit import Ahead, Direction, Driver, Given, Out, Overwrite, Seed, Speed, Varied
+from codriver.cli.simulate_circuit import (
+    Ahead,
+    Direction,
+    Driver,
+    Given,
+    Out,
+    Overwrite,
+    Seed,
+    Speed,
+    Varied,
+    hard_bends,
+)
 
 if TYPE_CHECKING:
     from codriver.finding import Finding
@@ -95,6 +106,7 @@ def shared(
         program, notes = _compiled(model, circuit.car.speed) if assist == "predicted" else (None, [])
         stage("driving")
         first = simulate_shared(SharedSetting(circuit, chosen, used_to_it), program, seed=seed)
+        notes = [*notes, *hard_bends(circuit.car.speed, first.drive.curvature)]
         found: dict[str, list[Outcome]] = {}
         for kind in kinds:
             stage(f"comparing: {kind}")

@@ -173,6 +173,7 @@ class CsvRecording(TableRecording):
                     column_names=list(layout.headers),
                     encoding=layout.encoding,
                     block_size=1 << 22,
+                    use_threads=False,  # skip is Python: no other thread may call it
                 ),
                 parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter, invalid_row_handler=skip),
                 convert_options=arrow_csv.ConvertOptions(

@@ -32,4 +32,7 @@ def circuit_driver(name: str) -> TwoPointDriver:
     try:
         return CIRCUIT_DRIVERS[name]
     except KeyError:
-        raise UsageError(f"driver '{name}'", f"one of {', '.join(CIRCUIT_DRIVERS)}", "choose one of these") from None
+        raise UsageError(
+            f"driver '{name}'", f"one of {', '.join(CIRCUIT_DRIVERS)}, or a driver's file NAME.toml",
+            "choose one of these, or give a file",
+        ) from None  # fmt: skip
