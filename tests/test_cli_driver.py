@@ -121,10 +121,15 @@ def test_error_against_horizon(laps: Path, tmp_path: Path) -> None:
     assert list(made) == [("pwc", "direct"), ("pwl", "direct"), ("ridge", "direct"), ("ridge", "iterated")]
     assert made["ridge", "direct"][1] < 0.5 * made["pwc", "direct"][1]
     assert told["held_out"] == ["anna", "anna2"]
+    bands = {(row["model"], row["form"]): row["inside95"] for row in told["models"]}
+    assert bands.pop(("ridge", "iterated")) is None
+    assert all(len(shares) == 2 and 0.5 < min(shares) <= max(shares) <= 1 for shares in bands.values())
+    assert "in the 95 % band of" in report.read_text()
     assert "Forecasts, one a second" in report.read_text()
     said = ran(*command, "--horizons", "0.5", "--vehicle", "okamoto2019-simulator")
     assert "not iterated: " in said
     assert "0.5 s" in said
+    assert "in the 95 % band" in said
     done = CliRunner().invoke(app, ["driver", "horizon", str(laps / "anna.csv"), "--horizons", "0.2,later"])
     assert isinstance(done.exception, CodriverError)
     assert "positive numbers" in str(done.exception)

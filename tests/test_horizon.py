@@ -260,6 +260,19 @@ def test_errors_part_by_part() -> None:
     assert np.allclose(found.spread("direct", "ridge"), [np.std(c, ddof=1) / 2 for c in each.T])
 
 
+def test_moments_inside_the_band_as_a_fit_to_the_other_drive_has_it() -> None:
+    drives = {"one": driven(direction="left"), "two": driven(seed=2, direction="left")}
+    found = error_against_horizon(drives, ("ridge",), (0.2,))
+    made = fit_driver(drives["one"], "ridge").predict(drives["two"])
+    at = {round(t, 3): k for k, t in enumerate(made.time)}
+    rows = np.flatnonzero(found.part == 1)
+    there = [at[round(t, 3)] for t in found.time[rows]]
+    inside = (made.measured >= made.low) & (made.measured <= made.high)
+    assert np.array_equal(found.inside["ridge"][rows, 0], inside[there])
+    assert 0.85 < found.coverage["ridge"][0] < 1
+    assert set(found.coverage) == {"pwc", "pwl", "ridge"}
+
+
 def test_a_road_that_is_not_known_is_no_hindrance() -> None:
     log = Log.of([s for s in driven(direction="left").values() if s.name != "road_curvature"], source="bare")
     found = error_against_horizon({"bare": log}, ("ridge",), (0.2, 0.4), vehicle())

@@ -113,6 +113,7 @@ def horizons_told(found: HorizonErrors, drives: list[str], notes: list[str], rep
             "model": kind, "form": form, "rmse_Nm": found.rmse(form, kind).tolist(),
             "rmse_se_Nm": [s if isfinite(s) else None for s in spread.tolist()],
             "parts": {n: each.tolist() for n, each in zip(found.folds, found.parts(form, kind), strict=True)},
+            "inside95": found.coverage[kind].tolist() if form == "direct" else None,
             "diverged": found.diverged[kind].tolist() if form == "iterated" else None,
         })  # fmt: skip
     return {
@@ -148,8 +149,17 @@ def say_horizons(told: dict[str, Any]) -> None:
         pairs = zip(row["rmse_Nm"], row["rmse_se_Nm"], strict=True)
         cells = [f"{value:.3f}" + (f" ± {error:.3f}" if error is not None else "") for value, error in pairs]
         table.add_row(row["model"] + (" iterated" if row["form"] == "iterated" else ""), *cells)
+    bands = Table(box=None, pad_edge=False)
+    bands.add_column("in the 95 % band")
+    for h in told["horizons_s"]:
+        bands.add_column(f"{h:g} s", justify="right")
+    for row in told["models"]:
+        if row["inside95"] is not None:
+            bands.add_row(row["model"], *(f"{share:.0%}" for share in row["inside95"]))
     out.print()
     out.print(table)
+    out.print()
+    out.print(bands)
     out.print("\n[bold]verdict[/]:")
     say_findings(out, told["findings"])
     if told["report"]:

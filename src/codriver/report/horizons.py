@@ -84,6 +84,7 @@ def _errors(found: HorizonErrors) -> Chart:
 
 def _table(found: HorizonErrors) -> Table:
     rows = [(_name(*key), *found.rmse(*key).tolist()) for key in found.made]
+    rows += [(f"% in the 95 % band of {FULL[kind]}", *(100 * share).tolist()) for kind, share in found.coverage.items()]
     for kind, share in found.diverged.items():
         if share[-1] > 0:
             rows.append((f"% of {FULL[kind]}'s rollouts held at a bound", *(100 * share).tolist()))

@@ -72,14 +72,19 @@ def error_against_horizon(
     judged = {fold.name: tables[last].take(fold.test) for fold in folds}
     made: dict[tuple[str, str], list[Array]] = {}
     beyond: dict[str, list[Flags]] = {}
+    inside: dict[str, list[Flags]] = {}
     for fold in folds:
         for kind in (*NAIVE, *kinds):
-            columns = []
+            columns, held = [], []
             for k in ticks:
                 _tell(progress, f"{kind}, {k * setting.tick:g} s ahead, fold {fold.name}")
-                driver = fit_table(tables[k].take(fold.train), kind, protocol=protocols[k], calibrate=False)
-                columns.append(predicted(driver.regressor, driver.scaling, tables[k].take(fold.test))[0])
+                driver = fit_table(tables[k].take(fold.train), kind, protocol=protocols[k])
+                test = tables[k].take(fold.test)
+                mean, sd = predicted(driver.regressor, driver.scaling, test)
+                columns.append(mean)
+                held.append(np.abs(test.y - mean) <= driver.calibration.half_width(sd))
             made.setdefault(("direct", kind), []).append(np.stack(columns, axis=1))
+            inside.setdefault(kind, []).append(np.stack(held, axis=1))
         for kind in kinds if plant is not None else ():
             _tell(progress, f"{kind} iterated, fold {fold.name}")
             train = tables[one].take(fold.train)
@@ -95,7 +100,8 @@ def error_against_horizon(
         np.concatenate([t.drive for t in judged.values()]), np.repeat(np.arange(len(folds)), [f.test.size for f in folds]),
         np.concatenate([_now(t) for t in judged.values()]), _truth(tables, ticks, folds),
         {key: np.concatenate(parts) for key, parts in made.items()},
-        {kind: np.concatenate(parts) for kind, parts in beyond.items()}, tuple(f.name for f in folds),
+        {kind: np.concatenate(parts) for kind, parts in beyond.items()},
+        {kind: np.concatenate(parts) for kind, parts in inside.items()}, tuple(f.name for f in folds),
         max((f.when for f in tables[last].features if f.kind == "preview"), default=0.0), tables[last].target,
         tables[last].left_out, tables[last].estimated,
     )  # fmt: skip

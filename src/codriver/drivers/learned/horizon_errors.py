@@ -29,6 +29,7 @@ class HorizonErrors:
         truth: torque h later, N m, shape (n, m).
         made: by form and kind, N m, shape (n, m); NAIVE among the direct ones; no "iterated" without a vehicle.
         beyond: by kind, whether the rollout has passed a bound by then, shape (n, m).
+        inside: by kind, whether the torque is in the direct form's calibrated 95 % band, shape (n, m).
         folds: names of the parts held out in turn.
         road: how far ahead the road is known at the last horizon, s at the present speed; 0 without a road.
         target: the torque's name.
@@ -44,6 +45,7 @@ class HorizonErrors:
     truth: Array
     made: Mapping[tuple[str, str], Array]
     beyond: Mapping[str, Flags]
+    inside: Mapping[str, Flags]
     folds: tuple[str, ...]
     road: float
     target: str
@@ -69,6 +71,11 @@ class HorizonErrors:
     def diverged(self) -> dict[str, Array]:
         """By kind, share of the rollouts that have passed a bound by then, shape (m,); they count in `iterated`."""
         return {kind: flags.mean(axis=0) for kind, flags in self.beyond.items()}
+
+    @property
+    def coverage(self) -> dict[str, Array]:
+        """By kind, share of the moments inside the direct form's 95 % band, shape (m,)."""
+        return {kind: flags.mean(axis=0) for kind, flags in self.inside.items()}
 
     def rmse(self, form: str, kind: str) -> Array:
         """Over all rows, N m, shape (m,)."""
