@@ -51,6 +51,11 @@ def say_driver(told: dict[str, Any]) -> None:
     say_findings(out, told["findings"])
     for note in told["notes"]:
         out.print(f"  note {note}", markup=False)
+    if told["model"] == "gp":
+        out.print(
+            "  note a gp cannot run sample by sample, as in simulate shared or a live run; other models can",
+            markup=False,
+        )
     for leak in told["leaks"]:
         out.print(f"  leak {leak}", markup=False)
     out.print(f"\nwrote {told['result']}" + (f" and {told['report']}" if told["report"] else ""), markup=False)

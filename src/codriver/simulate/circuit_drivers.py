@@ -36,3 +36,8 @@ def circuit_driver(name: str) -> TwoPointDriver:
             f"driver '{name}'", f"one of {', '.join(CIRCUIT_DRIVERS)}, or a driver's file NAME.toml",
             "choose one of these, or give a file",
         ) from None  # fmt: skip
+
+
+def name_of(driver: TwoPointDriver) -> str | None:
+    """The name of a driver of CIRCUIT_DRIVERS, none of another."""
+    return next((name for name, known in CIRCUIT_DRIVERS.items() if known == driver), None)

@@ -21,6 +21,7 @@ from codriver.models.two_point_file import FiledDriver, save_two_point
 from codriver.signals import Log
 from codriver.signals.signal import Array
 from codriver.simulate.circuit import CircuitDrive, CircuitSetting, simulate_circuit
+from codriver.simulate.circuit_drivers import name_of
 from codriver.simulate.folder import refuse_foreign, write_folder
 from codriver.vehicles import Vehicle, save_vehicle
 
@@ -84,7 +85,9 @@ def write_files(drive: CircuitDrive, folder: Path, more: Mapping[str, tuple[Arra
     truth = drive.truth()
     columns = [Column(signal.name, signal.values, signal.unit) for signal in truth.values()]
     columns += [Column(name, values, unit) for name, (values, unit) in (more or {}).items()]
-    filed = FiledDriver.of(drive.setting.driver, "truth", f"drove the circuit, seed {drive.seed}")
+    filed = FiledDriver.of(
+        drive.setting.driver, name_of(drive.setting.driver) or "truth", f"drove the circuit, seed {drive.seed}"
+    )
     save_two_point(filed, files.driver)
     write_table(files.truth, drive.time, columns, {"source": truth.source, "seed": str(drive.seed)})
     save_vehicle(circuit_vehicle(drive.setting), files.vehicle)
@@ -101,7 +104,7 @@ def circuit_vehicle(setting: CircuitSetting) -> Vehicle:
         "steering_damping": wheel.damping, "steering_friction": wheel.friction,
     }  # fmt: skip
     for name, value in values.items():
-        made = made.with_parameter(name, value)
+        made = made.with_parameter(name, value, source="as simulated")
     return made
 
 
