@@ -15,7 +15,7 @@ from codriver.signals.signal import Array
 
 TICK = 0.05  # s
 MOST = 0.7  # s
-LATE = 0.2  # s; simulated drives in time give -0.15 to 0.1 s
+LATE = 0.2  # s; simulated drives in time give -0.15 to 0.05 s
 RATE = 0.02  # rad/s, where friction turns
 
 
