@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from codriver.finding import Finding
+from codriver.identify.driver_lateness import late_findings
 from codriver.identify.driver_record import DriverRecord
 from codriver.signals.signal import Array
 
@@ -41,6 +42,7 @@ def sign_findings(record: DriverRecord) -> tuple[Finding, ...]:
         found.append(
             _bad(f"{record.source}: the torque varies by {sd:.3g} N m (sd), which no driver pulls", "look at its unit")
         )
+    found += late_findings(angle, torque, record.dt, record.source)
     if not record.summed:
         found += _path(record, rows)
     return tuple(found)
