@@ -231,7 +231,7 @@ class TestBounds:
 
     @pytest.mark.parametrize(
         ("name", "roll", "torque", "force"),
-        [("slalom", 0.3, 2.5, 20), ("double-lane-change", 0.3, 2.5, 12), ("track", 0.6, 4.5, 40)],
+        [("slalom", 0.3, 2.5, 20), ("double-lane-change", 0.45, 2.5, 12), ("track", 0.6, 4.5, 40)],
     )
     def test_with_noise(self, quick, name, roll, torque, force):
         done = scenario(name)
