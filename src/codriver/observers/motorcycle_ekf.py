@@ -1,11 +1,10 @@
 """The motorcycle's large-angle extended Kalman filter on the raw signals of an IMU, a steering encoder and a speed.
 
-    x = (phi, delta, v_y, W, phi', delta', Y_f, Y_r, tau, M_phi, theta', b_p, b_q, b_r, b_y, b_z, delta_0)
+    x = (phi, delta, v_y, W, phi', delta', Y_f, Y_r, tau, M_phi, theta', b_p, b_q, b_r, b_y, b_z)
 
 The first eight move as `models.motorcycle_lean` says, at any lean; the rider's torque tau walks. M_phi, N m, is a moment about the
 road that nothing else explains: a leaning rider, a side wind, feet on the ground. theta' is a pitch rate that comes and goes within
-`PITCH_TIME`. The biases of gyroscope and accelerometer walk slowly, and so
-does the encoder's zero: it shows delta + delta_0. In body axes (ISO 8855) the IMU at (X, n, Z) shows
+`PITCH_TIME`. The biases of gyroscope and accelerometer walk slowly. In body axes (ISO 8855) the IMU at (X, n, Z) shows
 
     p = phi' + b_p,   q = theta' + W sin phi + b_q,   r = W cos phi + b_r
     f_y = a_y cos phi + (a_z + g) sin phi + b_y,      f_z = -a_y sin phi + (a_z + g) cos phi + b_z
@@ -61,9 +60,8 @@ NEEDED = tuple(name for name in (*ROWS, SPEED) if name not in OPTIONAL)
 # The states in their order, by the names of the outputs.
 STATES = (
     "roll_angle", "steer_angle", "lateral_velocity", "heading_rate", "roll_rate", "steer_rate", "front_lateral_force",
-    "rear_lateral_force", "rider_torque", "roll_moment", "pitching", *(f"{row}_bias" for row in IMU), "steer_offset",
+    "rear_lateral_force", "rider_torque", "roll_moment", "pitching", *(f"{row}_bias" for row in IMU),
 )  # fmt: skip
-OWN = {"steer_offset": "what steer_angle shows straight ahead"}
 N, MOVING, LEAN = len(STATES), 8, len(LEAN_STATES)
 ROLL, TURN, LEANING, MOMENT, PITCHING, BIASES = 0, 3, 4, 9, 10, 11
 PITCH_TIME, MOMENT_TIME, TILT_TIME, HEAVE_TIME = 0.2, 0.5, 0.5, 0.2  # s
@@ -75,8 +73,8 @@ SLOW = (2.0, 4.0)  # m/s: all of it below the first, none above the second
 STEEPEST, SURE = 1.35, 3 * DEGREE
 CLOSE, TERMS = 1e-3, 12
 # What states cannot exceed, so that nonsense stays finite; standard deviations at the start. Units of STATES.
-BOUNDS = (STEEPEST + 0.1, 1.0, 20.0, 6.0, 10.0, 30.0, 2e4, 2e4, 1e3, 5e3, 3.0, 1.0, 1.0, 1.0, 5.0, 5.0, 0.5)
-START = (0.15, 0.05, 0.5, 0.2, 0.3, 0.5, 300.0, 300.0, 30.0, 50.0, 0.05, 0.01, 0.01, 0.01, 0.25, 0.25, 0.01)
+BOUNDS = (STEEPEST + 0.1, 1.0, 20.0, 6.0, 10.0, 30.0, 2e4, 2e4, 1e3, 5e3, 3.0, 1.0, 1.0, 1.0, 5.0, 5.0)
+START = (0.15, 0.05, 0.5, 0.2, 0.3, 0.5, 300.0, 300.0, 30.0, 50.0, 0.05, 0.01, 0.01, 0.01, 0.25, 0.25)
 SCATTER = dict(zip(IMU, (0.05, 0.05, 0.05, 1.0, 1.0), strict=True))  # rad/s, m/s^2, until learnt
 
 
@@ -91,7 +89,7 @@ class EkfNoise:
         moment, feet: sd of M_phi, N m, when riding and what is added when slow.
         pitch: sd of theta', rad/s.
         tilt: sd of the pitch angle, rad, which turns p by W and r by phi' times itself, for `TILT_TIME` seconds.
-        gyro_walk, accelerometer_walk, creep: of the biases and the encoder's zero, rad/s, m/s^2, rad per sqrt(s).
+        gyro_walk, accelerometer_walk: of the biases, rad/s and m/s^2 per sqrt(s).
         share: systematic error of the roll in parts of it, which is told in its standard deviation and not carried.
         heave: error of the vertical acceleration of a lean, which springs take up, in parts of it, for `HEAVE_TIME` seconds.
         gyro, lateral_force, vertical_force, encoder: floors of the rows' sd, rad/s, m/s^2, rad, for errors that are independent at
@@ -109,7 +107,6 @@ class EkfNoise:
     pitch: float = 0.03
     gyro_walk: float = 0.0005
     accelerometer_walk: float = 1e-3
-    creep: float = 1e-4
     share: float = 0.015
     heave: float = 0.3
     tilt: float = 0.012
@@ -119,10 +116,10 @@ class EkfNoise:
     encoder: float = 0.0005
 
     def process(self) -> Array:
-        """Intensities of the states, shape (17,)."""
+        """Intensities of the states, shape (16,)."""
         white = [0.0, 0.0, self.lateral, self.yaw, self.roll, self.steer, self.tyre, self.tyre, self.torque]
         come_and_go = [self.moment * (2 / MOMENT_TIME) ** 0.5, self.pitch * (2 / PITCH_TIME) ** 0.5]
-        return np.square([*white, *come_and_go, *[self.gyro_walk] * 3, *[self.accelerometer_walk] * 2, self.creep])
+        return np.square([*white, *come_and_go, *[self.gyro_walk] * 3, *[self.accelerometer_walk] * 2])
 
     def floors(self, dt: float) -> dict[str, float]:
         """Least variance of a tick's sample, by row."""
@@ -242,7 +239,7 @@ def _start(p: LeanParameters, came: Scalars, v: Scalar) -> list[Scalar]:
 
 
 def _sensor_function(p: LeanParameters) -> Scalar:
-    """CasADi function: what the rows should show, shape (6, 1), and the derivatives by the state, shape (6, 17).
+    """CasADi function: what the rows should show, shape (6, 1), and the derivatives by the state, shape (6, 16).
 
     Of the state, (v_y', W', phi'') and their derivatives by the first ten states, v, sin phi, cos phi.
     """
@@ -257,8 +254,8 @@ def _sensor_function(p: LeanParameters) -> Scalar:
     side = a[0] + v * W + X * a[1] - Z * swing - n * lift + W * W * (Z * S - n * C)
     up = (rho - Z) * lift + n * swing + g
     rows = ca.vertcat(
-        w + b[0], x[PITCHING] + W * S + b[1], W * C + b[2], side * C + up * S + b[3], up * C - side * S + b[4], x[1] + b[5],
-    )  # fmt: skip
+        w + b[0], x[PITCHING] + W * S + b[1], W * C + b[2], side * C + up * S + b[3], up * C - side * S + b[4], x[1]
+    )
     H = ca.jacobian(rows, x)
     H[:, ROLL] += ca.jacobian(rows, S) * C - ca.jacobian(rows, C) * S
     H[:, :LEAN] += ca.jacobian(rows, a) @ bent
@@ -280,10 +277,12 @@ def _outputs(low: float, high: float) -> tuple[Output, ...]:
     """All outputs."""
     outputs = []
     for name in STATES:
-        unit = quantity("steer_angle" if name == "steer_offset" else name.removesuffix("_bias")).unit
-        meaning = f"bias of {name[:-5]}" if name.endswith("_bias") else OWN.get(name) or quantity(name).meaning
-        outputs.append(Output(name, unit, "estimate", meaning))
-        outputs.append(Output(f"{name}_sd", unit, "sd", f"standard deviation of {name}"))
+        unit = quantity(name.removesuffix("_bias")).unit
+        meaning = f"bias of {name[:-5]}" if name.endswith("_bias") else quantity(name).meaning
+        outputs += [
+            Output(name, unit, "estimate", meaning),
+            Output(f"{name}_sd", unit, "sd", f"standard deviation of {name}"),
+        ]
     for row in ROWS:
         unit, name = quantity(row).unit, f"{row}_innovation"
         outputs += [
