@@ -20,7 +20,14 @@ SpeedError = Annotated[
     float, typer.Option("--speed-error", metavar="PERCENT", help="Of the wheel speed, beside lean and slip.")
 ]
 Encoder = Annotated[int, typer.Option("--encoder", min=0, help="Counts of the steering encoder a turn; 0: ideal.")]
-Bank = Annotated[float, typer.Option("--bank", metavar="DEGREES", help="Of the road, to both sides in turn.")]
+Bank = Annotated[
+    float,
+    typer.Option(
+        "--bank",
+        metavar="DEGREES",
+        help="Of the road, to both sides in turn. The truth's roll_angle is from the road; an estimate's from the vertical.",
+    ),
+]
 RiderMass = Annotated[float, typer.Option("--rider-mass", metavar="KG", help="Of the rider; vehicle.toml keeps 75.")]
 Tyres = Annotated[
     float, typer.Option("--tyre-stiffness", metavar="PERCENT", help="Of Sharp's; vehicle.toml keeps 100.")
@@ -74,11 +81,12 @@ def motorcycle(
         stage("riding")
         files, record = write_ride(out, setting, seed)
     ride = record.ride
+    seen = " from the road" if bank else ""
     roll, torque = ride.of("roll"), ride.of("rider_torque")
     console().print(
         f"{scenario}, rider of {rider_mass:g} kg, tyres of {tyre_stiffness:g} % stiffness, seed {seed}\n"
         f"{ride.time[-1]:.0f} s at {3.6 * ride.speed.min():.0f} to {3.6 * ride.speed.max():.0f} km/h, "
-        f"roll {degrees(roll.min()):.0f} to {degrees(roll.max()):.0f} degrees, rider's torque {rms(torque):.1f} N m (rms), "
+        f"roll {degrees(roll.min()):.0f} to {degrees(roll.max()):.0f} degrees{seen}, rider's torque {rms(torque):.1f} N m (rms), "
         f"off the path by {rms(ride.offset):.2f} m (rms), {abs(ride.offset).max():.2f} m at most\n"
         f"wrote {', '.join(str(p) for p in vars(files).values())}",
         markup=False,
