@@ -20,6 +20,20 @@ SpeedError = Annotated[
     float, typer.Option("--speed-error", metavar="PERCENT", help="Of the wheel speed, beside lean and slip.")
 ]
 Encoder = Annotated[int, typer.Option("--encoder", min=0, help="Counts of the steering encoder a turn; 0: ideal.")]
+Zero = Annotated[
+    float,
+    typer.Option(
+        "--zero", metavar="DEGREES", help="What the encoder shows when the bar is straight; names.toml keeps 0."
+    ),
+]
+Imu = Annotated[
+    tuple[float, float, float],
+    typer.Option(
+        "--imu",
+        metavar="X Y Z",
+        help="Its place from the road point below the rear frame's mass centre, m: forward, left, up. vehicle.toml tells it.",
+    ),
+]
 Bank = Annotated[
     float,
     typer.Option(
@@ -48,6 +62,8 @@ def motorcycle(
     bias: Bias = 0.0,
     speed_error: SpeedError = 0.0,
     encoder: Encoder = 4096,
+    zero: Zero = 0.0,
+    imu: Imu = (0.1, 0.03, 0.8),
     bank: Bank = 0.0,
     rider_mass: RiderMass = 75.0,
     tyre_stiffness: Tyres = 100.0,
@@ -74,8 +90,8 @@ def motorcycle(
     refuse_foreign(out, "ride", FILES)
     refuse_earlier(out, overwrite)
     setting = RideSetting(
-        scenario, noise / 100, bias, speed_error / 100, encoder, radians(bank), rider_mass, tyre_stiffness / 100, rate=rate,
-        seconds=duration,
+        scenario, noise / 100, bias, speed_error / 100, encoder, radians(zero), imu, radians(bank), rider_mass,
+        tyre_stiffness / 100, rate=rate, seconds=duration,
     )  # fmt: skip
     with working(True, 1) as stage:
         stage("riding")
