@@ -93,6 +93,8 @@ def driver(
         },
         "given": dict(fit.given), "refused": {r.name: r.reason for r in fit.refused},
         "settled": fit.settled, "minutes": fit.seconds / 60, "speeds_m_s": list(fit.speeds), "unexplained_Nm": fit.rms,
+        "holes": [{"drive": d.source, **vars(h)} for d in fit.drives for h in d.holes],
+        "left_out": [{"drive": d.source, **vars(p)} for d in fit.drives for p in d.left_out],
         "explained": fit.explained, "one_step_Nm": fit.one_step,
         "findings": [{"severity": f.severity, "text": f.text} for f in driver_findings(fit)],
         "result": str(out), "report": str(report) if report is not None else None,
@@ -157,9 +159,8 @@ def _say(fit: DriverFit, other: FiledDriver | None, told: dict[str, Any]) -> Non
     from codriver.report.two_point import HEAD, two_point_rows
 
     out = console()
-    speeds = ", ".join(f"{3.6 * v:.0f}" for v in fit.speeds)
     out.print(
-        f"{escape(', '.join(told['drives']))}: {fit.seconds / 60:.1f} min at {speeds} km/h, by {WORDS[fit.by]}; "
+        f"{escape(', '.join(told['drives']))}: {fit.seconds / 60:.1f} min at {fit.speeds_told()}, by {WORDS[fit.by]}; "
         f"{100 * fit.explained:.1f} % of the torque explained, {fit.rms:.2g} N m left\n"
     )
     for note in told["notes"]:
