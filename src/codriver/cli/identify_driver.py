@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from codriver.cli.driver import Overwrite
 from codriver.cli.identify import Report, _check_outputs, _finite
 from codriver.cli.identify_alignment import app
 from codriver.cli.options import Bus, Dbc, Json, Names
@@ -44,7 +45,6 @@ VehicleName = Annotated[
     str | None, typer.Option("--vehicle", help="Built-in name or TOML file: its column tells the torque, where no sensor does.",
                              show_default=False),
 ]  # fmt: skip
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a driver file that is there.")]
 
 
 @app.command("driver")
