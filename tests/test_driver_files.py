@@ -171,7 +171,9 @@ class TestFromFilesToADrive:
         assert "does not tell" in refused(*drive).found
         assert not (tmp_path / "again").exists()
         ran(*drive, "--given", ",".join(told["refused"]), "--no-variability")
-        taken = load_two_point(tmp_path / "again" / "truth.toml").driver()
+        drove = load_two_point(tmp_path / "again" / "truth.toml")
+        assert drove.name == "ekf"
+        taken = drove.driver()
         assert taken.muscle == 0.1
         assert taken.anticipation == told["parameters"]["anticipation"]["value"]
         assert "all known" in refused(*drive[:3], tmp_path / "x", "--driver", "anna", "--given", "muscle").do
