@@ -97,6 +97,17 @@ def test_a_driver_is_replaced_only_if_one_says_so(laps: Path, tmp_path: Path) ->
     assert driver.read_text() == "{}"
 
 
+def test_a_gp_is_told_to_have_no_step(laps: Path, tmp_path: Path) -> None:
+    few = ("--set", "inducing=20", "--set", "searched=100")
+    said = "a gp cannot run sample by sample"
+    for model, options, noted in (("gp", few, True), ("ridge", (), False)):
+        command = ("driver", "fit", laps / "anna.csv", *names(laps), "--model", model, *options)
+        told = json.loads(ran(*command, "-o", tmp_path / f"{model}.driver", "--json"))
+        assert any(said in note for note in told["notes"]) is noted
+    gp = ("driver", "fit", laps / "anna.csv", *names(laps), "--model", "gp", *few)
+    assert said in ran(*gp, "-o", tmp_path / "gp.driver", "--overwrite")
+
+
 def test_evaluate_holds_drives_out_and_says_who_wins(laps: Path, tmp_path: Path) -> None:
     report = tmp_path / "judged.html"
     command = ("driver", "evaluate", laps / "anna.csv", laps / "anna2.csv", *names(laps), "--model", "ridge", "--both")
