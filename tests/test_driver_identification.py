@@ -268,9 +268,7 @@ class TestSeveral:
         assert fit.parameters["anticipation"].value == pytest.approx(truth.anticipation, rel=0.02)
         assert fit.estimated == ("estimate: driver-torque-pi",)
         assert any("estimate's lag" in f.text for f in driver_findings(fit))
-        holed[30_000:30_100] = np.nan
-        with pytest.raises(LogError, match=r"holes in driver_torque 1\.0 s"):
-            identify_driver(clean.with_signals(cd.Signal("driver_torque", torque.time, holed, "N*m")))
+        assert not fit.drives[0].holes
 
 
 class TestVerdict:
