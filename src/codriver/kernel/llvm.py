@@ -17,7 +17,7 @@ import ctypes
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 from codriver.kernel.record import Recorded
@@ -44,13 +44,17 @@ class Compiled:
 
 
 def compile_loop(recorded: Recorded) -> Compiled:
-    """Compile the loop over samples of a recorded step."""
+    """Compile the loop over samples of a recorded step; one that was compiled lately is not compiled again."""
+    return _compiled(print_loop(recorded), 2 if recorded.operations() <= QUICK_TO_OPTIMISE else 0)
+
+
+@lru_cache(maxsize=64)
+def _compiled(text: str, level: int) -> Compiled:
+    """The machine code of a loop printed as LLVM text; it keeps no state of its own, so programs may share it."""
     import llvmlite.binding as llvm
 
-    text = print_loop(recorded)
     module = llvm.parse_assembly(text)
     module.verify()
-    level = 2 if recorded.operations() <= QUICK_TO_OPTIMISE else 0
     machine = _machine(level)
     options = llvm.create_pipeline_tuning_options(speed_level=level)
     builder = llvm.create_pass_builder(machine, options)
