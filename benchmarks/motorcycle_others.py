@@ -131,7 +131,7 @@ def filterpy_kalman(model: LPV, dt: float, terms: int) -> Work:
 def numpy_ekf(p: LeanParameters, dt: float, terms: int) -> Work:
     """The large-angle filter, joint updates; rates, Jacobian and rows by CasADi's functions, called a tick."""
     rates, linear = lean_functions(p)
-    show, noise = ekf._sensor_function(p), ekf.EkfNoise()
+    show, noise = ekf.sensor_function(p), ekf.EkfNoise()
     Q, floors = np.diag(noise.process() * dt), np.array(list(noise.floors(dt).values()))
     fade, decay = np.exp(-ekf.TRACKING * dt), np.zeros(ekf.N)
     decay[[ekf.MOMENT, ekf.PITCHING]] = -1 / ekf.MOMENT_TIME, -1 / ekf.PITCH_TIME

@@ -130,6 +130,12 @@ class TestModel:
 
     def test_a_run_is_the_same_however_many_there_are(self):
         assert np.array_equal(simulate_wheel(runs=3, seed=2).measured[1], simulate_wheel(runs=2, seed=2).measured[1])
+        # One run is computed in plain numbers.
+        for wheel in (Wheel(), Wheel(friction=0.5), Wheel(friction=0.2, end_stop=0.3)):
+            setting = replace(REAL, wheel=wheel)
+            alone, among = (simulate_wheel(CHIRP[:300], setting, runs=runs, seed=2) for runs in (1, 3))
+            for name in ("angle", "rate", "measured"):
+                assert np.array_equal(getattr(alone, name)[0], getattr(among, name)[0])
         with pytest.raises(cd.CodriverError, match="one of step, continuous, derivative"):
             simulate_wheel(setting=WheelSetting(noise=WheelNoise("often")))
 

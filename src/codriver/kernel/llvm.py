@@ -43,9 +43,15 @@ class Compiled:
     engine: Any  # owns the machine code: must live as long as `run`
 
 
-def compile_loop(recorded: Recorded) -> Compiled:
-    """Compile the loop over samples of a recorded step; one that was compiled lately is not compiled again."""
-    return _compiled(print_loop(recorded), 2 if recorded.operations() <= QUICK_TO_OPTIMISE else 0)
+def compile_loop(recorded: Recorded, *, anew: bool = False) -> Compiled:
+    """Compile the loop over samples of a recorded step.
+
+    Args:
+        recorded: the step.
+        anew: compile it even if the same was compiled lately, to see how long that takes.
+    """
+    level = 2 if recorded.operations() <= QUICK_TO_OPTIMISE else 0
+    return (_compiled.__wrapped__ if anew else _compiled)(print_loop(recorded), level)
 
 
 @lru_cache(maxsize=64)

@@ -147,7 +147,7 @@ def motorcycle_ekf(
     check_tick(dt)
     noise = noise or EkfNoise()
     rates, linear = lean_functions(p)
-    show = _sensor_function(p)
+    show = sensor_function(p)
     terms = _terms(linear, dt, high)
     Q, floors = noise.process(), noise.floors(dt)
 
@@ -238,10 +238,11 @@ def _start(p: LeanParameters, came: Scalars, v: Scalar) -> list[Scalar]:
     return [known.get(name, 0.0) for name in STATES]
 
 
-def _sensor_function(p: LeanParameters) -> Scalar:
-    """CasADi function: what the rows should show, shape (6, 1), and the derivatives by the state, shape (6, 16).
+def sensor_function(p: LeanParameters) -> Scalar:
+    """CasADi function of what the sensors should show, h(x), as the module's docstring writes it, and H = dh/dx.
 
-    Of the state, (v_y', W', phi'') and their derivatives by the first ten states, v, sin phi, cos phi.
+    It is (x, a, bent, v, sin phi, cos phi) -> (h, H, a_z): a = (v_y', W', phi''), bent its derivatives by the first ten states,
+    shape (3, 10); h as `ROWS`, rad/s, m/s^2, rad, shape (6, 1), H of shape (6, 16), a_z in m/s^2.
     """
     import casadi as ca
 
