@@ -13,8 +13,8 @@ ROOT = Path(__file__).parent.parent
 # Files that take longest, longest first. A worker takes a file at a time: a long one begun last would leave the others idle.
 LONG = (
     "test_papers", "test_paper_steering2019", "test_steering_identification", "test_driver_identification",
-    "test_paper_drivers2019", "test_drivers_errata", "test_tune", "test_export", "test_paper_motorcycle2018", "test_elementary",
-    "test_style", "test_identify", "test_style_of_driving", "test_learned_models", "test_mixtures", "test_motorcycle_trust",
+    "test_paper_drivers2019", "test_drivers_errata", "test_style", "test_identify", "test_tune", "test_paper_motorcycle2018",
+    "test_style_of_driving", "test_motorcycle_trust", "test_export", "test_elementary", "test_learned_models", "test_mixtures",
 )  # fmt: skip
 
 
