@@ -14,6 +14,7 @@ from codriver.models.motorcycle_lean import LeanParameters, lean_functions
 from codriver.names import quantity
 from codriver.observers import motorcycle_ekf as ekf
 from codriver.report.panels import panels
+from codriver.simulate.motorcycle import RideSetting, simulate_ride
 from codriver.testing import check_observer
 from rides import BIASES, DEGREE, errors, leaning_ride, noisy, ride_log, rms, scenario, vehicle
 
@@ -182,7 +183,8 @@ def test_report(estimate):
     made = panels(estimate, truth)
     titles = [panel.title.split(",")[0] for panel in made]
     assert titles[:4] == [
-        "Lean of the machine", "Torque of the rider on the handlebar", "Lateral forces of the tyres", "Steer angle",
+        "Lean of the machine from the vertical", "Torque of the rider on the handlebar", "Lateral forces of the tyres",
+        "Steer angle",
     ]  # fmt: skip
     assert len(set(titles)) == len(titles)
     assert [item.name for item in made[0].items] == ["95% band", "estimate, not valid", "estimate", "true"]
@@ -250,6 +252,17 @@ class TestBounds:
         found = quick.run(ride_log(done, noisy(done, **BIASES)))
         assert rms(errors(found, done, "roll_angle", 4.0)) < 0.5 * DEGREE
         assert found.columns["roll_rate_bias"][-1] == pytest.approx(0.5 * DEGREE, abs=0.15 * DEGREE)
+
+    def test_on_a_banked_road_the_lean_is_from_the_vertical(self, quick):
+        """The bank swings to 3 degrees either way; from the road's normal the same estimate errs by it."""
+        done = simulate_ride(RideSetting("slalom", rate=1000, bank=3 * DEGREE), seed=1).ride
+        found = quick.run(ride_log(done, noisy(done)))
+        bank = np.interp(found.time, done.time, done.of("bank"))[found.time >= 1.0 - 1e-9]
+        off = errors(found, done, "roll_angle")
+        assert rms(off) > 0.8 * rms(bank) > 1.2 * DEGREE
+        assert rms(off - bank) < 0.3 * DEGREE
+        sd = found.columns["roll_angle_sd"][found.time >= 1.0 - 1e-9]
+        assert (np.abs(off - bank) < 1.96 * sd).mean() > 0.9
 
     @pytest.mark.parametrize("change", ["soft", "heavy"])
     def test_bands_cover_a_wrong_machine(self, parameters, change):

@@ -247,6 +247,21 @@ class TestScenarios:
         upright = np.abs(done.of("roll")) < 0.02
         assert (log["longitudinal_speed"].values / done.speed)[upright].mean() == pytest.approx(1.02, abs=4e-3)
 
+    def test_an_imu_elsewhere_and_an_encoder_off_its_zero(self):
+        """A rigid frame: f' - f = w' x d + w x (w x d); the same rates, the same ride."""
+        asked = {"scenario": "double-lane-change", "rate": 1000, "seconds": 2.0, "counts": 0}
+        here, there = (
+            simulate_ride(RideSetting(**asked, **more)) for more in ({}, {"imu": (1.1, -0.17, 0.5), "zero": 0.02})
+        )
+        a, b, d = here.measured, there.measured, np.array([1.0, -0.2, -0.3])
+        np.testing.assert_array_equal(here.ride.of("roll"), there.ride.of("roll"))
+        np.testing.assert_allclose(b["steer_angle"] - a["steer_angle"], 0.02, atol=1e-12)
+        w = np.column_stack([a[name] for name in ("body_roll_rate", "body_pitch_rate", "body_yaw_rate")])
+        moved = np.cross(np.gradient(w, here.ride.time, axis=0), d) + np.cross(w, np.cross(w, d))
+        for axis, name in enumerate(("force_x", "force_y", "force_z")):
+            np.testing.assert_allclose((b[name] - a[name])[2:-2], moved[2:-2, axis], atol=0.03)
+        assert np.abs(moved[:, 1]).max() > 0.3
+
     def test_a_leaning_wheel_turns_faster(self, machine):
         done = ride(Rider(machine, straight(), steady(20.0), lean=lambda _t: 0.6), 4.0, every=10)
         p, roll = machine.parameters.sharp, done.of("roll")[-1]
@@ -267,7 +282,15 @@ class TestScenarios:
         np.testing.assert_allclose(truth["lateral_velocity"].values[1:-1], aside[1:-1], atol=5e-3)
 
     def test_what_cannot_be_is_refused(self):
-        for wrong in ({"scenario": "wheelie"}, {"rate": 300}, {"noise": -1.0}, {"seconds": 0.0}, {"bank": 1.0}):
+        for wrong in (
+            {"scenario": "wheelie"},
+            {"rate": 300},
+            {"noise": -1.0},
+            {"seconds": 0.0},
+            {"bank": 1.0},
+            {"zero": 1.0},
+            {"imu": (0.0, 0.0, 9.0)},
+        ):
             with pytest.raises(UsageError):
                 RideSetting(**wrong)
         with pytest.raises(UsageError, match="rider"):
@@ -326,12 +349,27 @@ class TestVariations:
 class TestFiles:
     def test_what_the_command_writes_is_the_ride(self, tmp_path):
         out = tmp_path / "ride"
-        asked = ["--scenario", "slalom", "--noise", "7.5", "--bias", "1", "--duration", "1", "--seed", "4"]
+        asked = [
+            "--scenario",
+            "slalom",
+            "--noise",
+            "7.5",
+            "--bias",
+            "1",
+            "--duration",
+            "1",
+            "--seed",
+            "4",
+            "--imu",
+            "-0.3",
+            "0",
+            "0.9",
+        ]
         said = CliRunner().invoke(app, ["simulate", "motorcycle", "-o", str(out), *asked])
         assert said.exit_code == 0, said.output
         assert "50 to " in said.output
         assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
-        record = simulate_ride(RideSetting("slalom", noise=0.075, bias=1.0, seconds=1.0), seed=4)
+        record = simulate_ride(RideSetting("slalom", noise=0.075, bias=1.0, seconds=1.0, imu=(-0.3, 0.0, 0.9)), seed=4)
         log = read(out / "ride.csv", names=out / "names.toml")
         for name, signal in record.log().items():
             np.testing.assert_allclose(log[name].values, signal.values, atol=2e-4)
@@ -339,7 +377,7 @@ class TestFiles:
         truth = read(out / "truth.parquet")
         for name, signal in record.truth().items():
             np.testing.assert_array_equal(truth[name].values, signal.values)
-        assert load_vehicle(out / "vehicle.toml") == nominal_vehicle()
+        assert load_vehicle(out / "vehicle.toml") == nominal_vehicle((-0.3, 0.0, 0.9))
         again = CliRunner().invoke(app, ["simulate", "motorcycle", "-o", str(out)])
         assert isinstance(again.exception, UsageError)
 

@@ -20,7 +20,28 @@ SpeedError = Annotated[
     float, typer.Option("--speed-error", metavar="PERCENT", help="Of the wheel speed, beside lean and slip.")
 ]
 Encoder = Annotated[int, typer.Option("--encoder", min=0, help="Counts of the steering encoder a turn; 0: ideal.")]
-Bank = Annotated[float, typer.Option("--bank", metavar="DEGREES", help="Of the road, to both sides in turn.")]
+Zero = Annotated[
+    float,
+    typer.Option(
+        "--zero", metavar="DEGREES", help="What the encoder shows when the bar is straight; names.toml keeps 0."
+    ),
+]
+Imu = Annotated[
+    tuple[float, float, float],
+    typer.Option(
+        "--imu",
+        metavar="X Y Z",
+        help="Its place from the road point below the rear frame's mass centre, m: forward, left, up. vehicle.toml tells it.",
+    ),
+]
+Bank = Annotated[
+    float,
+    typer.Option(
+        "--bank",
+        metavar="DEGREES",
+        help="Of the road, to both sides in turn. The truth's roll_angle is from the road; an estimate's from the vertical.",
+    ),
+]
 RiderMass = Annotated[float, typer.Option("--rider-mass", metavar="KG", help="Of the rider; vehicle.toml keeps 75.")]
 Tyres = Annotated[
     float, typer.Option("--tyre-stiffness", metavar="PERCENT", help="Of Sharp's; vehicle.toml keeps 100.")
@@ -41,6 +62,8 @@ def motorcycle(
     bias: Bias = 0.0,
     speed_error: SpeedError = 0.0,
     encoder: Encoder = 4096,
+    zero: Zero = 0.0,
+    imu: Imu = (0.1, 0.03, 0.8),
     bank: Bank = 0.0,
     rider_mass: RiderMass = 75.0,
     tyre_stiffness: Tyres = 100.0,
@@ -67,18 +90,19 @@ def motorcycle(
     refuse_foreign(out, "ride", FILES)
     refuse_earlier(out, overwrite)
     setting = RideSetting(
-        scenario, noise / 100, bias, speed_error / 100, encoder, radians(bank), rider_mass, tyre_stiffness / 100, rate=rate,
-        seconds=duration,
+        scenario, noise / 100, bias, speed_error / 100, encoder, radians(zero), imu, radians(bank), rider_mass,
+        tyre_stiffness / 100, rate=rate, seconds=duration,
     )  # fmt: skip
     with working(True, 1) as stage:
         stage("riding")
         files, record = write_ride(out, setting, seed)
     ride = record.ride
+    seen = " from the road" if bank else ""
     roll, torque = ride.of("roll"), ride.of("rider_torque")
     console().print(
         f"{scenario}, rider of {rider_mass:g} kg, tyres of {tyre_stiffness:g} % stiffness, seed {seed}\n"
         f"{ride.time[-1]:.0f} s at {3.6 * ride.speed.min():.0f} to {3.6 * ride.speed.max():.0f} km/h, "
-        f"roll {degrees(roll.min()):.0f} to {degrees(roll.max()):.0f} degrees, rider's torque {rms(torque):.1f} N m (rms), "
+        f"roll {degrees(roll.min()):.0f} to {degrees(roll.max()):.0f} degrees{seen}, rider's torque {rms(torque):.1f} N m (rms), "
         f"off the path by {rms(ride.offset):.2f} m (rms), {abs(ride.offset).max():.2f} m at most\n"
         f"wrote {', '.join(str(p) for p in vars(files).values())}",
         markup=False,

@@ -14,8 +14,8 @@ from codriver.report.document import BLACK, GREY, Chart, Curve, Document, Findin
 from codriver.signals import Log
 
 FULL = {
-    "pwc": "the torque stays (3)", "pwl": "its slope stays (4)", "ridge": "ridge", "ann": "neural net (26)",
-    "gp": "Gaussian process (16)", "gmr": "GMR (23)", "hmm-gmr": "HMM-GMR (25)", "boosting": "boosted ridge",
+    "pwc": "the torque stays (eq. 3)", "pwl": "its slope stays (eq. 4)", "ridge": "ridge", "ann": "neural net (eq. 26)",
+    "gp": "Gaussian process (eq. 16)", "gmr": "GMR (eq. 23)", "hmm-gmr": "HMM-GMR (eq. 25)", "boosting": "boosted ridge",
     "guarded": "guarded (default)",
 }  # fmt: skip
 # All nine beside each other must be told apart.
@@ -123,13 +123,14 @@ def _bars(e: Evaluation) -> Chart:
 
 def _means(e: Evaluation) -> Chart:
     """Mean RMSE by model with standard errors."""
-    names = [FULL[k].replace(" (", "<br>(") for k in e.kinds]  # nine in a row are turned and cut off otherwise
+    names = [FULL[k] for k in e.kinds]
     mean = np.array([e.mean(k) for k in e.kinds])
     error = np.nan_to_num(np.array([e.spread(k) for k in e.kinds]))
     curve = Curve("", names, mean, "#0072B2", "bars", low=mean - error, high=mean + error)
     return Chart(
         "Error of each model", "", (Plot("RMSE (N m)", (curve,), 260, (e.mean("pwc"), e.mean("ridge"))),),
-        "Bars: over all parts; whiskers: standard error over the parts. Dotted: 'the torque stays' and ridge.",
+        "Bars: over all parts; whiskers: standard error over the parts. Dotted: 'the torque stays' and ridge. "
+        "Equations are those of Okamoto and Tsiotras (2019).",
     )  # fmt: skip
 
 

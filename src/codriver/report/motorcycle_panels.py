@@ -49,7 +49,13 @@ def motorcycle_panels(
         roll, torque, steer: what is drawn of these, with bands and truth; nothing where the estimator has none.
     """
     made = [
-        Panel("Lean of the machine, positive to the right", shown_unit("roll_angle"), 240, roll, estimate.valid),
+        Panel(
+            "Lean of the machine from the vertical, positive to the right",
+            shown_unit("roll_angle"),
+            240,
+            roll,
+            estimate.valid,
+        ),
         Panel(
             "Torque of the rider on the handlebar, positive to the left",
             shown_unit("rider_torque"),

@@ -2,7 +2,7 @@
 
 ride.csv        what a logger on the machine has: gyroscope and accelerometer in the leaning frame's axes, encoder, wheel speed
 names.toml      what the columns mean
-vehicle.toml    the machine that the ride was planned for, IMU's place included; another rider or other tyres are not in it
+vehicle.toml    the machine that the ride was planned for, IMU's place included; another rider, other tyres, encoder's zero are not
 truth.parquet   roll, steer, lateral velocity, rates, tyre forces, the rider's torque, place on the course
 """
 
@@ -42,11 +42,15 @@ class RideFiles:
     truth: Path
 
 
-def nominal_vehicle() -> Vehicle:
-    """Sharp's machine with what the simulated one has beyond it and an observer may use."""
+def nominal_vehicle(imu: tuple[float, float, float] | None = None) -> Vehicle:
+    """Sharp's machine with what the simulated one has beyond it and an observer may use.
+
+    Args:
+        imu: another place of the IMU than the machine's, m: forward, left, up.
+    """
     machine = nominal_machine()
     vehicle, source = load_vehicle("sharp1971"), "codriver.simulate.motorcycle, of usual order"
-    forward, left, height = machine.imu
+    forward, left, height = imu or machine.imu
     for name, value in (
         ("front_crown_radius", machine.front.crown), ("rear_crown_radius", machine.rear.crown),
         ("pneumatic_trail", machine.front.pneumatic_trail), ("drag", machine.air_density * machine.drag_area / 2),
@@ -82,7 +86,7 @@ def _write(record: RideRecord, folder: Path) -> None:
     files.names.write_text(
         f"# The log of a simulated ride; rates and accelerations in the machine's axes.\n{names}", encoding="utf-8"
     )
-    save_vehicle(nominal_vehicle(), files.vehicle)
+    save_vehicle(nominal_vehicle(record.setting.imu), files.vehicle)
     truth = record.truth()
     columns = [Column(signal.name, signal.values, signal.unit) for signal in truth.values()]
     write_table(files.truth, record.ride.time, columns, {"source": truth.source, "seed": str(record.seed)})

@@ -38,12 +38,14 @@ from codriver.simulate.motorcycle.rider import Rider
 from codriver.simulate.motorcycle.sensors import IDEAL, RideSensors, relative_noise, sense
 from codriver.simulate.motorcycle.variations import NOMINAL_RIDER, with_rider, with_tyres
 from codriver.vehicles import load_vehicle
+from codriver.vehicles.known import KNOWN
 
 _KMH = 1 / 3.6
 TICK = 1e-3  # s, of the machine
 BANK_WAVE = 300.0  # m
 GYRO_BIAS, ACCELEROMETER_BIAS = 0.5 * pi / 180, 0.2  # rad/s, m/s^2: what is usual
 _RISE = BANK_WAVE / 2
+_IMU = tuple((KNOWN[name].low, KNOWN[name].high) for name in ("imu_forward", "imu_left", "imu_height"))  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +91,8 @@ class RideSetting:
         bias: of gyroscope and accelerometer, in `GYRO_BIAS` and `ACCELEROMETER_BIAS` an axis, to sides that the seed draws.
         speed_error: of the wheel's speed, beside what lean and slip make of it; 0.02 for 2 % too fast.
         counts: of the steering encoder in a turn; 0 for an ideal one.
+        zero: what the encoder shows when the handlebar is straight, rad; the log's reader is not told.
+        imu: its place from the road point below the rear frame's mass centre when upright, m: forward, left, up.
         bank: greatest of the road, rad.
         rider_mass: kg.
         tyre_stiffness: in parts of Sharp's.
@@ -105,6 +109,8 @@ class RideSetting:
     bias: float = 0.0
     speed_error: float = 0.0
     counts: int = 4096
+    zero: float = 0.0
+    imu: tuple[float, float, float] = MachineParameters.imu
     bank: float = 0.0
     rider_mass: float = NOMINAL_RIDER
     tyre_stiffness: float = 1.0
@@ -123,12 +129,22 @@ class RideSetting:
                 "noise 0 to 1, bank to 0.2 rad either way, speed error to 0.2 either way, counts of 0 or more",
                 "change the setting",
             )
+        if not abs(self.zero) <= 0.2:
+            raise UsageError(
+                f"an encoder's zero {self.zero:g} rad off", "0.2 rad either way at most", "change the setting"
+            )
+        if not all(low <= at <= high for at, (low, high) in zip(self.imu, _IMU, strict=True)):
+            raise UsageError(
+                f"an IMU at {', '.join(f'{at:g}' for at in self.imu)} m",
+                f"forward, left, up within {', '.join(f'{low:g} to {high:g}' for low, high in _IMU)} m", "change the setting",
+            )  # fmt: skip
         if self.seconds is not None and not self.seconds > 0:
             raise UsageError(f"a ride of {self.seconds:g} s", "more than 0 s", "choose such")
 
     def machine(self) -> MachineParameters:
         """What is ridden."""
-        return with_tyres(with_rider(nominal_machine(), self.rider_mass), self.tyre_stiffness)
+        made = with_tyres(with_rider(nominal_machine(), self.rider_mass), self.tyre_stiffness)
+        return replace(made, imu=self.imu)
 
     def bank_at(self, distance: float) -> float:
         """Of the road, rad, to the right.
@@ -226,5 +242,5 @@ def sensors_of(setting: RideSetting, done: Ride, seed: int) -> RideSensors:
     return replace(
         base, gyro_bias=(float(gyro[0]), float(gyro[1]), float(gyro[2])),
         accelerometer_bias=(float(force[0]), float(force[1]), float(force[2])), counts=setting.counts,
-        speed_scale=1 + setting.speed_error, wheel=True,
+        zero=setting.zero, speed_scale=1 + setting.speed_error, wheel=True,
     )  # fmt: skip

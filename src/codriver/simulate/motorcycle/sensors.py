@@ -1,7 +1,7 @@
 """What sensors make of a ride: IMU in the rear frame at an offset, steering encoder, wheel speed.
 
     y = s + b + n,   n ~ N(0, sigma^2)          gyroscope, accelerometer; b a constant bias
-    delta = q round(delta / q)                  encoder of 2 pi / q counts
+    delta = q round((delta + delta_0) / q)      encoder of 2 pi / q counts, its zero delta_0 off
     v = c omega_f R_f                           wheel speed by the radius when upright: too high by some percent when leaning
 
 The accelerometer measures the specific force at its place in body axes: gravity, centripetal and lever-arm terms are all in it.
@@ -31,6 +31,7 @@ class RideSensors:
         gyro_noise, accelerometer_noise: sigma a sample, rad/s and m/s^2.
         gyro_bias, accelerometer_bias: forward, left, up, rad/s and m/s^2.
         counts: of the steering encoder in a turn; 0 for an ideal one.
+        zero: what the encoder shows when the handlebar is straight, rad.
         speed_noise: sigma a sample, m/s.
         speed_scale: c, of the measured to the true speed.
         wheel: whether the speed is the front wheel's, not that over ground.
@@ -41,6 +42,7 @@ class RideSensors:
     gyro_bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
     accelerometer_bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
     counts: int = 4096
+    zero: float = 0.0
     speed_noise: float = 0.05
     speed_scale: float = 1.0
     wheel: bool = False
@@ -83,7 +85,7 @@ def sense(ride: Ride, sensors: RideSensors, seed: int = 0) -> dict[str, Array]:
     ):
         for name, offset in zip(names, bias, strict=True):
             measured[name] = ride.of(name) + offset + noise * rng.standard_normal(count)
-    steer = ride.of("steer")
+    steer = ride.of("steer") + sensors.zero
     if sensors.counts:
         tick = 2 * pi / sensors.counts
         steer = tick * np.round(steer / tick)
