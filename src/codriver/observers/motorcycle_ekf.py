@@ -47,6 +47,7 @@ from codriver.observers.augmented_kalman import Moments, carried, pack, unpack
 from codriver.observers.covariance import Matrix, update_row
 from codriver.observers.motorcycle_ekf_rows import sensor_function
 from codriver.observers.motorcycle_ekf_states import (
+    BEND_TIME,
     BIASES,
     HEAVE_TIME,
     IMU,
@@ -61,6 +62,7 @@ from codriver.observers.motorcycle_ekf_states import (
     ROLL,
     ROWS,
     STEEPEST,
+    STEER,
     TILT_TIME,
     TURN,
     EkfNoise,
@@ -197,6 +199,9 @@ def _rows(p: LeanParameters, noise: EkfNoise, dt: float) -> Callable[..., tuple[
             if row in TILTED:
                 seen = noise.tilt * found[TILTED[row]]
                 R = R + seen * seen * (2 * TILT_TIME / dt)
+            if row == "steer_angle" and noise.zero:
+                seen = noise.bend * found[STEER]
+                R = R + seen * seen * (2 * BEND_TIME / dt)
             if row == "vertical_acceleration":
                 R = R + (noise.heave * heave) ** 2 * (2 * HEAVE_TIME / dt)
             mean, covariance, s = update_row(done.x, done.P, [H[k, i] for i in range(n)], e, R, fresh[row])

@@ -24,8 +24,8 @@ STATES = (
 )  # fmt: skip
 OFFSET = "steer_offset"  # delta_0, after the others
 N, MOVING, LEAN = len(STATES), 8, len(LEAN_STATES)
-ROLL, TURN, LEANING, MOMENT, PITCHING, BIASES = 0, 3, 4, 9, 10, 11
-PITCH_TIME, MOMENT_TIME, TILT_TIME, HEAVE_TIME = 0.2, 0.5, 0.5, 0.2  # s
+ROLL, STEER, TURN, LEANING, MOMENT, PITCHING, BIASES = 0, 1, 3, 4, 9, 10, 11
+PITCH_TIME, MOMENT_TIME, TILT_TIME, HEAVE_TIME, BEND_TIME = 0.2, 0.5, 0.5, 0.2, 0.5  # s
 RATE = 100.0  # Hz, at which the floors of the rows are told
 STEEPEST = 1.35  # rad, of a roll that the filter follows
 # What states cannot exceed, so that nonsense stays finite; standard deviations at the start. Units of STATES.
@@ -49,6 +49,8 @@ class EkfNoise:
         share: systematic error of the roll in parts of it, which is told in its standard deviation and not carried.
         heave: error of the vertical acceleration of a lean, which springs take up, in parts of it, for `HEAVE_TIME` seconds.
         zero, creep: sd of the encoder's zero, rad, at the start, and of its walk, rad per sqrt(s); with zero 0 it is known.
+        bend: error of the steer angle that a bend takes, in parts of it, for `BEND_TIME` seconds; where the zero is to be found, so
+            that bends do not pass for one.
         gyro, lateral_force, vertical_force, encoder: floors of the rows' sd, rad/s, m/s^2, rad, for errors that are independent at
             `RATE`.
     """
@@ -73,6 +75,7 @@ class EkfNoise:
     encoder: float = 0.0005
     zero: float = 0.0
     creep: float = 1e-5
+    bend: float = 0.05
 
     @property
     def states(self) -> tuple[str, ...]:
