@@ -29,7 +29,7 @@ def run(quick: bool = False) -> Iterator[Row]:
         recorded = observer.record()
         what = f"compile {name}, {form} form" if name != "pedals-only" else f"compile {name}"
         say(f"  {what}")
-        ours = measure(lambda recorded=recorded: compile_loop(recorded), 2 if quick else 5)
+        ours = measure(lambda recorded=recorded: compile_loop(recorded, anew=True), 2 if quick else 5)
         operations = f"{recorded.operations()} operations"
         if find_spec("numba") is None:
             yield Row(what, f"{ours.best:.3f} s (+{ours.spread})", note=f"{operations}; numba is not installed")

@@ -10,6 +10,18 @@ import pytest
 import codriver as cd
 
 ROOT = Path(__file__).parent.parent
+# Files that take longest, longest first. A worker takes a file at a time: a long one begun last would leave the others idle.
+LONG = (
+    "test_papers", "test_paper_steering2019", "test_steering_identification", "test_driver_identification",
+    "test_paper_drivers2019", "test_drivers_errata", "test_tune", "test_export", "test_paper_motorcycle2018", "test_elementary",
+    "test_style", "test_identify", "test_style_of_driving", "test_learned_models", "test_mixtures", "test_motorcycle_trust",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Long files first, where tests are handed out to several workers."""
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG))
 
 
 def recording(folder: str) -> Path:

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from codriver.cli.app import app
 from codriver.cli.driver_words import evaluation_told
+from codriver.drivers.learned.driver_file import load_driver
 from codriver.drivers.learned.evaluate import evaluate as judge
 from codriver.drivers.learned.protocol import Protocol
 from codriver.errors import CodriverError
@@ -74,9 +75,37 @@ def test_signals_of_ones_own_choice(laps: Path, tmp_path: Path) -> None:
     told = json.loads(ran(*command, "--signals", "steering_wheel_angle,road_curvature", "--json"))
     assert told["signals"] == ["steering_wheel_angle", "road_curvature", "longitudinal_speed"]
     assert told["left_out"] == []
-    done = CliRunner().invoke(app, [str(word) for word in (*command, "--signals", "steering_angel")])
+    done = CliRunner().invoke(app, [str(word) for word in (*command, "--overwrite", "--signals", "steering_angel")])
     assert isinstance(done.exception, CodriverError)
     assert "standard names" in str(done.exception)
+
+
+def test_a_driver_is_replaced_only_if_one_says_so(laps: Path, tmp_path: Path) -> None:
+    driver, report = tmp_path / "anna.driver", tmp_path / "anna.html"
+    command = ("driver", "fit", laps / "anna.csv", *names(laps), "--model", "pwc", "-o", driver)
+    ran(*command)
+    first = driver.read_bytes()
+    with pytest.raises(CodriverError, match=r"is there already[^$]*--overwrite"):
+        ran(*command, "--name", "another", "--report", report)
+    assert driver.read_bytes() == first
+    assert not report.exists()
+    ran(*command, "--name", "another", "--overwrite")
+    assert load_driver(driver).name == "another"
+    driver.write_text("{}")
+    with pytest.raises(CodriverError, match="driver file"):
+        ran(*command, "--overwrite")
+    assert driver.read_text() == "{}"
+
+
+def test_a_gp_is_told_to_have_no_step(laps: Path, tmp_path: Path) -> None:
+    few = ("--set", "inducing=20", "--set", "searched=100")
+    said = "a gp cannot run sample by sample"
+    for model, options, noted in (("gp", few, True), ("ridge", (), False)):
+        command = ("driver", "fit", laps / "anna.csv", *names(laps), "--model", model, *options)
+        told = json.loads(ran(*command, "-o", tmp_path / f"{model}.driver", "--json"))
+        assert any(said in note for note in told["notes"]) is noted
+    gp = ("driver", "fit", laps / "anna.csv", *names(laps), "--model", "gp", *few)
+    assert said in ran(*gp, "-o", tmp_path / "gp.driver", "--overwrite")
 
 
 def test_evaluate_holds_drives_out_and_says_who_wins(laps: Path, tmp_path: Path) -> None:

@@ -140,6 +140,27 @@ class TestFromFilesToADrive:
         assert np.sqrt(np.mean((one - other) ** 2)) < 0.02 * one.std()
         assert "is there already" in refused(*words, "-o", found).found
 
+    def test_a_drive_with_holes_is_cut(self, laps, tmp_path):
+        header, *rows = (laps / "drive.csv").read_text().splitlines()
+        kept = [r for r in rows if not 65 < float(r.split(",")[0]) < 85 and not 100 < float(r.split(",")[0]) < 120]
+        drive, report = tmp_path / "holed.csv", tmp_path / "holed.html"
+        drive.write_text("\n".join([header, *kept]) + "\n")
+        known = "K_c=6, T_L=1.2, T_I=0.4, tau_p=0.16, K_t=5, T_N=0.1, far=1.2"
+        words = ("identify", "driver", drive, "--names", laps / "names.toml", "--known", known)
+        said = ran(*words, "-o", tmp_path / "a.toml", "--report", report)
+        assert "heading_error have 2 holes, the longest 20.0 s at 65.0 s" in said
+        assert "left out 85.0-100.0 s: shorter than 60 s" in said
+        assert "min at 50 km/h" in said
+        told = json.loads(ran(*words, "-o", tmp_path / "b.toml", "--json"))
+        assert told["parameters"]["anticipation"]["value"] == pytest.approx(5.0, rel=0.02)
+        assert {h["signal"] for h in told["holes"]} >= {"driver_torque", "road_curvature"}
+        assert [(round(p["start"]), round(p["stop"])) for p in told["left_out"]] == [(85, 100)]
+        assert len(told["speeds_m_s"]) == 2
+        page = report.read_text(encoding="utf-8")
+        assert "each piece settles anew" in page
+        assert "no: shorter than 60 s" in page
+        assert load_two_point(tmp_path / "a.toml").source == f"identified from {drive}, by the road"
+
     def test_what_is_not_told_must_be_given(self, laps, tmp_path):
         found = tmp_path / "ekf.toml"
         words = ("identify", "driver", laps / "drive.csv", "--names", laps / "names.toml", "--known", "near=6, far=1.2")
@@ -150,7 +171,9 @@ class TestFromFilesToADrive:
         assert "does not tell" in refused(*drive).found
         assert not (tmp_path / "again").exists()
         ran(*drive, "--given", ",".join(told["refused"]), "--no-variability")
-        taken = load_two_point(tmp_path / "again" / "truth.toml").driver()
+        drove = load_two_point(tmp_path / "again" / "truth.toml")
+        assert drove.name == "ekf"
+        taken = drove.driver()
         assert taken.muscle == 0.1
         assert taken.anticipation == told["parameters"]["anticipation"]["value"]
         assert "all known" in refused(*drive[:3], tmp_path / "x", "--driver", "anna", "--given", "muscle").do

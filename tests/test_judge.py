@@ -5,6 +5,7 @@ import pytest
 
 import codriver as cd
 from codriver.simulate import demo_drive
+from codriver.simulate.compare import best_lag
 from codriver.simulate.judge import at, delay_matched, judge
 
 SEEDS = (1, 2, 3)
@@ -81,3 +82,24 @@ def test_gaps_in_the_wheel_speeds(drives, car):
     assert gaps < 0.15 * held, (base, gaps, held)
     own = delay_matched(over_gaps, drive.truth, "intentional_acceleration").columns["intentional_jerk"]
     assert rms((over_gaps.columns["intentional_jerk"] - own)[over_gaps.valid]) < 2 * base
+
+
+@pytest.mark.parametrize("offset", [0.0, 30.0])
+def test_best_lag_is_that_of_numpy_lag_by_lag(offset):
+    """The sums give what correlating the chosen ticks afresh at each lag does, with holes and a mean far from zero."""
+    random = np.random.default_rng(1)
+    truth = np.convolve(random.standard_normal(3000), np.ones(50), "same") + offset
+    late = np.concatenate([np.full(38, truth[0]), truth[:-38]]) + 3 * random.standard_normal(truth.size)
+    use = random.random(truth.size) < 0.8
+    late[~use] = np.nan
+    each = [np.corrcoef(late[lag:][use[lag:]], truth[: truth.size - lag][use[lag:]])[0, 1] for lag in range(0, 201, 2)]
+    correlation, lag = best_lag(late, truth, use, 0.01)
+    assert lag == pytest.approx(0.02 * int(np.argmax(each))) == pytest.approx(0.38)
+    assert correlation == pytest.approx(max(each), abs=1e-12)
+
+
+def test_no_lag_is_best_where_a_signal_does_not_vary():
+    flat, moving = np.full(500, 0.1), np.random.default_rng(1).standard_normal(500)
+    always = np.ones(500, bool)
+    for estimate, truth, use in ((flat, moving, always), (moving, flat, always), (moving, moving, ~always)):
+        assert best_lag(estimate, truth, use, 0.01) == (-1.0, 0.0)

@@ -172,3 +172,13 @@ def test_long_steps_compile_quickly():
     made = (ctypes.c_void_p * 1)(outputs[0].ctypes.data)
     compiled.run(1, 0, ctypes.addressof(given_), ctypes.addressof(made))
     assert bits(outputs[0].tolist()) == bits(interpret(recorded, {}, {"x": 0.3})[1])
+
+
+def test_compiled_lately_is_not_compiled_again():
+    first = compile_loop(RECORDED)
+    assert compile_loop(RECORDED) is first
+    anew = compile_loop(RECORDED, anew=True)
+    assert anew is not first
+    assert anew.text == first.text
+    one, two = (record("same", lambda c, u, n=n: ({}, {"y": n * u["x"]}), [], ["x"]) for n in (2.5, 3.5))
+    assert compile_loop(one) is not compile_loop(two)

@@ -12,7 +12,7 @@ import codriver as cd
 from codriver.identify.steering_ekf import joint_ekf
 from codriver.identify.steering_fit import fit_wheel
 from codriver.identify.steering_joint import JointSettings, joint_functions
-from codriver.identify.steering_likelihood import Rows, run_wheel, simulate
+from codriver.identify.steering_likelihood import STEPS, Rows, derivatives, run_wheel, simulate
 from codriver.identify.steering_passes import algorithm_1
 from codriver.identify.steering_record import mend_angle
 from codriver.identify.steering_ukf import Weights, joint_ukf, ukf_weights
@@ -130,6 +130,12 @@ class TestModel:
 
     def test_a_run_is_the_same_however_many_there_are(self):
         assert np.array_equal(simulate_wheel(runs=3, seed=2).measured[1], simulate_wheel(runs=2, seed=2).measured[1])
+        # One run is computed in plain numbers.
+        for wheel in (Wheel(), Wheel(friction=0.5), Wheel(friction=0.2, end_stop=0.3)):
+            setting = replace(REAL, wheel=wheel)
+            alone, among = (simulate_wheel(CHIRP[:300], setting, runs=runs, seed=2) for runs in (1, 3))
+            for name in ("angle", "rate", "measured"):
+                assert np.array_equal(getattr(alone, name)[0], getattr(among, name)[0])
         with pytest.raises(cd.CodriverError, match="one of step, continuous, derivative"):
             simulate_wheel(setting=WheelSetting(noise=WheelNoise("often")))
 
@@ -427,6 +433,19 @@ class TestLikelihood:
             np.linalg.inv(-curvature) / np.outer(size, size), abs=0.1
         )
 
+    @pytest.mark.parametrize("friction", [0.0, 0.05])
+    def test_two_filters_abreast_give_the_bits_of_each(self, continuous, friction):
+        rows = replace(rows_of(continuous), fresh=np.arange(continuous.time.size) % 7 > 0)
+        rows.reset[400] = True
+        theta, free = np.array([np.log(J), np.log(B), friction, 0.01, *np.log([1e-9, 1e-6, 1e-6])]), [0, 2, 5]
+        by_e, by_s = derivatives(rows, theta, free)
+        for column, i in enumerate(free):
+            step = STEPS[i] * (np.arange(7) == i)
+            up, down = run_wheel(rows, theta + step), run_wheel(rows, theta - step)
+            assert np.array_equal(by_e[:, column], (up.e - down.e) / (2 * STEPS[i]))
+            assert np.array_equal(by_s[:, column], (up.s - down.s) / (2 * STEPS[i]))
+        assert np.abs(by_e).max(axis=0).min() > 0
+
     def test_simulation_is_the_filter_without_measurements(self, real):
         quiet = WheelNoise(process=0.0, angle=0.0)
         for wheel, off in ((Wheel(), 1e-9), (Wheel(friction=0.5), 0.01)):
@@ -505,9 +524,14 @@ class TestFit:
 
         from codriver.identify import steering_fit, steering_likelihood
 
-        with patch.object(steering_likelihood, "_program", wraps=steering_likelihood._program) as ran:
+        one, two = (
+            patch.object(steering_likelihood, name, wraps=getattr(steering_likelihood, name))
+            for name in ("_program", "_pair")
+        )
+        with one as ran, two as ran_two:
             steering_fit.fit_wheel(rows_of(paper, 0, "euler"), HALF)
-        assert ran.call_count < 2000
+        assert ran_two.call_count > 0
+        assert ran.call_count + 2 * ran_two.call_count < 2000
 
 
 class TestAlgorithm1:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import ROOT
+from conftest import LONG, ROOT
 
 BIN = Path(sys.executable).parent
 CHECKS = {
@@ -46,3 +46,8 @@ def test_help_is_light():
     )
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert ran.stdout.strip().splitlines()[-1] == "[]"
+
+
+def test_long_files_are_there():
+    """Those that a run of several workers begins with (conftest) have not been renamed."""
+    assert [name for name in LONG if not (ROOT / "tests" / f"{name}.py").exists()] == []

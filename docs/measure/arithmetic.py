@@ -60,7 +60,7 @@ def main() -> None:
         observer = cd.build(name, CAR, form=form)
         program, jerk = cd.compile(observer), cd.compile(observer, [JERK[name], "valid"])
         record = best(lambda observer=observer: observer.record())
-        translate = best(lambda program=program: compile_loop(program.recorded))
+        translate = best(lambda program=program: compile_loop(program.recorded, anew=True))
         state = len(program.recorded.carry)
         rows.append([
             name, form, str(program.recorded.operations()), str(jerk.recorded.operations()), str(state),

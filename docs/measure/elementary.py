@@ -235,7 +235,7 @@ def main() -> None:
         rows = []
         for name in SMOOTH:
             start = perf_counter()
-            compile_loop(recorded(name))
+            compile_loop(recorded(name), anew=True)
             took = perf_counter() - start
             errors = worst(name, real, count)
             where = max(errors, key=errors.__getitem__)

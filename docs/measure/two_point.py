@@ -1,6 +1,7 @@
-"""Figures of docs/two-point.md: drivers identified with the wrong points, at two speeds, from an estimated torque, by dual EKF.
+"""Figures of docs/two-point.md: drivers identified with the wrong points, at two speeds, from an estimated torque, from
+drives with holes, by dual EKF.
 
-Run from a clone: python docs/measure/two_point.py [points] [speeds] [torque] [dual]
+Run from a clone: python docs/measure/two_point.py [points] [speeds] [torque] [holes] [dual]
 """
 
 # ruff: noqa: T201
@@ -15,6 +16,7 @@ from codriver.identify import DriverFit, identify_driver
 from codriver.identify.driver_dual_ekf import DualTuning, dual_ekf
 from codriver.identify.driver_fit import ASKED
 from codriver.identify.driver_record import driver_record
+from codriver.identify.regression import rms
 from codriver.models.two_point import TwoPointDriver
 from codriver.papers.drivers2019.figure_15 import START, TRUTH
 from codriver.run import estimate_log
@@ -23,8 +25,10 @@ from codriver.simulate.circuit import CircuitSetting, simulate_circuit
 from codriver.simulate.circuit_drivers import CIRCUIT_DRIVERS
 from codriver.simulate.circuit_files import circuit_vehicle
 from codriver.simulate.rig import RigCar
+from codriver.simulate.variability import Variability
 
 CARLA = CIRCUIT_DRIVERS["carla"]
+DRIFTING = Variability(drift=0.07, near=0.002, far=0.001, motor=0.05)
 
 
 def say(what: str, fit: DriverFit, truth: TwoPointDriver) -> None:
@@ -66,6 +70,38 @@ def torque() -> None:
         say(f"column {what}", identify_driver(blind.with_signals(label)), TwoPointDriver())
 
 
+def holes() -> None:
+    """Parameters from drives with holes of 20 s, off those from the whole drive, in its standard errors: rms, and the most."""
+    for what, variability in (("always the same", None), ("gains that drift by 7 %", DRIFTING)):
+        off: dict[int, list[float]] = {1: [], 4: []}
+        for driver in CIRCUIT_DRIVERS.values():
+            known = TwoPointDriver(near=driver.near, far=driver.far)
+            log = simulate_circuit(CircuitSetting(driver, variability, laps=2), seed=1).log()
+            whole = identify_driver(log, known)
+            for count, found in off.items():
+                part = identify_driver(with_holes(log, count), known)
+                both = whole.parameters.keys() & part.parameters.keys()
+                found += [
+                    float(np.log(part.parameters[n].value / whole.parameters[n].value))
+                    * whole.parameters[n].value
+                    / whole.parameters[n].sd
+                    for n in both
+                ]
+        for count, found in off.items():
+            print(
+                f"{what}, {count} holes: {len(found)} parameters, {rms(np.array(found)):.2f} off, "
+                f"{max(map(abs, found)):.2f} at most"
+            )
+
+
+def with_holes(log: Log, count: int) -> Log:
+    """A drive whose torque lacks 20 s, so many times."""
+    torque = log["driver_torque"]
+    at = np.linspace(torque.time[0], torque.time[-1], count + 2)[1:-1]
+    gone = (np.abs(torque.time[:, None] - at) < 10.0).any(axis=1)
+    return log.with_signals(replace(torque, values=np.where(gone, np.nan, torque.values)))
+
+
 def dual() -> None:
     """The dual filter's tuning, on a driver who is always the same, from a driver a fifth to a half off."""
     record = driver_record(simulate_circuit(CircuitSetting(laps=1), seed=1).log(), TRUTH.near, TRUTH.far)
@@ -80,8 +116,8 @@ def dual() -> None:
 
 def main() -> None:
     """Those asked for, or all."""
-    for name in sys.argv[1:] or ["points", "speeds", "torque", "dual"]:
-        {"points": points, "speeds": speeds, "torque": torque, "dual": dual}[name]()
+    for name in sys.argv[1:] or ["points", "speeds", "torque", "holes", "dual"]:
+        {"points": points, "speeds": speeds, "torque": torque, "holes": holes, "dual": dual}[name]()
 
 
 if __name__ == "__main__":

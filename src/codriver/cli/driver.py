@@ -49,6 +49,7 @@ Signals = Annotated[
     ),
 ]
 Report = Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a driver file that is there.")]
 
 
 @app.command("fit")
@@ -61,22 +62,24 @@ def fit(
         str | None, typer.Option("--name", help="Whose it is. Default: the file's name.", show_default=False)
     ] = None,
     dbc: Dbc = None, names: Names = None, bus: Bus = None, vehicle: VehicleName = None, protocol: ProtocolName = "honest",
-    horizon: Horizon = None, signals: Signals = None, options: Options = None, report: Report = None, json: Json = False,
+    horizon: Horizon = None, signals: Signals = None, options: Options = None, report: Report = None,
+    overwrite: Overwrite = False, json: Json = False,
 ) -> None:  # fmt: skip
     """Learn how a driver steers from drives with a torque sensor, or with what estimates the torque (--vehicle).
 
     Example: codriver driver fit monday.csv tuesday.csv --names names.toml --model hmm-gmr -o anna.driver --report anna.html
     """
     from codriver.cli.driver_words import driver_told, say_driver
-    from codriver.cli.estimate import check_report
+    from codriver.cli.identify import _check_outputs
     from codriver.cli.terminal import command_line, working
-    from codriver.drivers.learned.driver_file import check_driver_name, save_driver
+    from codriver.drivers.learned.driver_file import SUFFIX, load_driver, save_driver
     from codriver.drivers.learned.kinds import class_of
     from codriver.drivers.learned.learned_driver import fit_driver
 
     class_of(model)
-    check_driver_name(out)
-    check_report(report)
+    _check_outputs(out, report, [*drives, *(p for p in (dbc, names) if p is not None)], overwrite, SUFFIX)
+    if out.exists():
+        load_driver(out)  # raises: only a driver file may be replaced
     chosen, parameters = with_signals(protocol_of(protocol, horizon), signals), parse_options(options or [])
     with working(not json, len(drives) + 2) as stage:
         logs, notes = read_drives(drives, dbc, names, bus, vehicle, stage)

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from codriver.drivers.learned.evaluate import Evaluation
     from codriver.drivers.learned.learned_driver import LearnedDriver
 
+NO_STEP = "a gp cannot run sample by sample, as in simulate shared or a live run; other models can"
+
 
 def driver_told(
     driver: LearnedDriver, drives: Sequence[str], notes: Sequence[str], out: Path, report: Path | None
@@ -25,7 +27,7 @@ def driver_told(
         "parameters": {k: v for k, v in driver.regressor.get_params(deep=False).items() if isinstance(v, int | float | str)},
         "leaks": list(driver.leaks),
         "findings": [{"severity": f.severity, "text": f.text} for f in driver.doubts],
-        "notes": list(notes), "band_scale": driver.calibration.scale,
+        "notes": [*notes, *((NO_STEP,) if driver.kind == "gp" else ())], "band_scale": driver.calibration.scale,
         "band_nu": driver.calibration.nu, "result": str(out), "report": str(report) if report is not None else None,
     }  # fmt: skip
 
@@ -51,11 +53,6 @@ def say_driver(told: dict[str, Any]) -> None:
     say_findings(out, told["findings"])
     for note in told["notes"]:
         out.print(f"  note {note}", markup=False)
-    if told["model"] == "gp":
-        out.print(
-            "  note a gp cannot run sample by sample, as in simulate shared or a live run; other models can",
-            markup=False,
-        )
     for leak in told["leaks"]:
         out.print(f"  leak {leak}", markup=False)
     out.print(f"\nwrote {told['result']}" + (f" and {told['report']}" if told["report"] else ""), markup=False)

@@ -210,8 +210,10 @@ def _run(
         _say(told)
 
 
-def _check_outputs(out: Path, report: Path | None, inputs: Sequence[Path], overwrite: bool) -> None:
-    """Whether vehicle and report can be written, asked before the long work.
+def _check_outputs(
+    out: Path, report: Path | None, inputs: Sequence[Path], overwrite: bool, suffix: str = ".toml"
+) -> None:
+    """Whether vehicle or driver, whose name ends in `suffix`, and report can be written, asked before the long work.
 
     Raises:
         UsageError: they cannot, or would replace what must not be.
@@ -220,7 +222,7 @@ def _check_outputs(out: Path, report: Path | None, inputs: Sequence[Path], overw
 
     from codriver.errors import UsageError
 
-    for option, path, suffixes in (("-o", out, (".toml",)), ("--report", report, (".html", ".htm"))):
+    for option, path, suffixes in (("-o", out, (suffix,)), ("--report", report, (".html", ".htm"))):
         if path is None:
             continue
         if path.suffix.lower() not in suffixes:

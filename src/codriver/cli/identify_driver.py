@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from codriver.cli.driver import Overwrite
 from codriver.cli.identify import Report, _check_outputs, _finite
 from codriver.cli.identify_alignment import app
 from codriver.cli.options import Bus, Dbc, Json, Names
@@ -44,7 +45,6 @@ VehicleName = Annotated[
     str | None, typer.Option("--vehicle", help="Built-in name or TOML file: its column tells the torque, where no sensor does.",
                              show_default=False),
 ]  # fmt: skip
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a driver file that is there.")]
 
 
 @app.command("driver")
@@ -93,6 +93,8 @@ def driver(
         },
         "given": dict(fit.given), "refused": {r.name: r.reason for r in fit.refused},
         "settled": fit.settled, "minutes": fit.seconds / 60, "speeds_m_s": list(fit.speeds), "unexplained_Nm": fit.rms,
+        "holes": [{"drive": d.source, **vars(h)} for d in fit.drives for h in d.holes],
+        "left_out": [{"drive": d.source, **vars(p)} for d in fit.drives for p in d.left_out],
         "explained": fit.explained, "one_step_Nm": fit.one_step,
         "findings": [{"severity": f.severity, "text": f.text} for f in driver_findings(fit)],
         "result": str(out), "report": str(report) if report is not None else None,
@@ -157,9 +159,8 @@ def _say(fit: DriverFit, other: FiledDriver | None, told: dict[str, Any]) -> Non
     from codriver.report.two_point import HEAD, two_point_rows
 
     out = console()
-    speeds = ", ".join(f"{3.6 * v:.0f}" for v in fit.speeds)
     out.print(
-        f"{escape(', '.join(told['drives']))}: {fit.seconds / 60:.1f} min at {speeds} km/h, by {WORDS[fit.by]}; "
+        f"{escape(', '.join(told['drives']))}: {fit.seconds / 60:.1f} min at {fit.speeds_told()}, by {WORDS[fit.by]}; "
         f"{100 * fit.explained:.1f} % of the torque explained, {fit.rms:.2g} N m left\n"
     )
     for note in told["notes"]:

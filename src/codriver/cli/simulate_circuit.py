@@ -68,7 +68,7 @@ def circuit(
         who_drives(driver, given), Variability() if variability else None, anticipation, laps=laps, direction=direction,
         car=car_at(speed),
     )  # fmt: skip
-    files, drive = write_circuit(out, setting, seed)
+    files, drive = write_circuit(out, setting, seed, file_name(driver))
     console().print(
         f"{driver}, {'varying' if variability else 'always the same'}, anticipation by {anticipation}, seed {seed}\n"
         f"{drive.time[-1] / 60:.1f} minutes at {speed:g} km/h, {direction}: "
@@ -114,6 +114,11 @@ def car_at(speed: float) -> RigCar:
     return replace(RigCar(), speed=speed / 3.6)
 
 
+def file_name(driver: str) -> str | None:
+    """What a driver of a file is called: as his file. None for one by name."""
+    return Path(driver).stem if Path(driver).suffix == ".toml" else None
+
+
 def who_drives(driver: str, given: str) -> TwoPointDriver:
     """A driver by name, or of a file.
 
@@ -122,10 +127,10 @@ def who_drives(driver: str, given: str) -> TwoPointDriver:
     """
     from codriver.errors import UsageError
     from codriver.models.two_point_file import load_two_point, named
-    from codriver.simulate.circuit_drivers import CIRCUIT_DRIVERS, circuit_driver
+    from codriver.simulate.circuit_drivers import circuit_driver
 
     take = [named(word.strip()) for word in given.split(",") if word.strip()]
-    if Path(driver).suffix == ".toml" and driver not in CIRCUIT_DRIVERS:
+    if file_name(driver) is not None:
         return load_two_point(driver).driver(take)
     if take:
         raise UsageError(f"--given {given} for {driver}", "a driver file", "leave it out: his parameters are all known")

@@ -73,7 +73,7 @@ def shared(
     from dataclasses import replace
 
     from codriver.cli.estimate import check_report
-    from codriver.cli.simulate_circuit import car_at, who_drives
+    from codriver.cli.simulate_circuit import car_at, file_name, who_drives
     from codriver.cli.terminal import command_line, working
     from codriver.errors import UsageError
     from codriver.logs.write import complete_or_nothing
@@ -113,12 +113,12 @@ def shared(
             one = {kind: replace(chosen, kind=kind)}
             found |= compare_assists(circuit, one, program, range(seed, seed + drives), used_to_it)
         if report is None:
-            files = write_shared(out, first)
+            files = write_shared(out, first, file_name(driver))
         else:
             alone = simulate_shared(SharedSetting(circuit), seed=seed)
             with complete_or_nothing(report) as draft:
                 write_document(shared_document(first, alone, found, driver, command_line(), notes), draft)
-                files = write_shared(out, first)
+                files = write_shared(out, first, file_name(driver))
     told: dict[str, Any] = {
         "driver": driver, "assist": assist, "gain": gain if assist != "none" else None,
         "used_to_it": used_to_it, "drives": drives, "seed": seed,

@@ -26,7 +26,9 @@ import numpy as np
 from codriver.errors import LogError, UsageError
 from codriver.identify.brake_fit import Refusal
 from codriver.identify.driver_dual_ekf import DualFit, DualTuning, dual_ekf
-from codriver.identify.driver_record import DriverRecord, driver_record
+from codriver.identify.driver_holes import holes_told
+from codriver.identify.driver_pieces import DrivePieces, drive_pieces
+from codriver.identify.driver_record import DriverRecord
 from codriver.identify.driver_residual import driver_of, jacobian, residual_of, thinning
 from codriver.identify.driver_result import DriverFit, DriverParameter
 from codriver.identify.driver_road import by_the_road
@@ -60,7 +62,7 @@ def identify_driver(
     """Identify a driver.
 
     Args:
-        drives: one or several, each at one speed, see `driver_record`.
+        drives: one or several, each at one speed, see `driver_record`; one with holes is cut there (`driver_pieces`).
         known: where the two points are, the parameters that are not asked for, and what is known of the others. K_r is among the
             former: K_p and K_c are those for this K_r.
         asked: names of the parameters to identify; None for all of ASKED, and K_r where the drives' speeds differ by a tenth.
@@ -70,7 +72,7 @@ def identify_driver(
         spread: standard deviation of the logarithms of the parameters asked for about those known.
 
     Raises:
-        MissingSignal, LogError: see `driver_record`; or nothing happens in a drive, or the dual filter diverges.
+        MissingSignal, LogError: see `drive_pieces`; or the dual filter diverges, or has a drive of several pieces.
         UsageError: a name is no parameter, or is asked for twice; there is no such way; the spread is not positive; no drive, or
             too many.
     """
@@ -89,9 +91,10 @@ def identify_driver(
         )  # fmt: skip
     if not logs or (by == "dual-ekf" and len(logs) > 1):
         raise UsageError(f"{len(logs)} drives", "one drive" + (" or several" if by != "dual-ekf" else ""), "say which")
-    records = tuple(driver_record(log, known.near, known.far) for log in logs)
-    for record in records:
-        _refuse_rest(record)
+    taken = tuple(drive_pieces(log, known.near, known.far) for log in logs)
+    records = tuple(r for drive in taken for r in drive.records)
+    if by == "dual-ekf":
+        _refuse_pieces(taken[0])
     if asked is None:
         asked = [n for n in dict.fromkeys((*ASKED, *_at_two_speeds(records), *also)) if n not in held]
         if not asked:
@@ -114,7 +117,7 @@ def identify_driver(
         np.zeros((0, 0)) if end is None else _correlation(end), names, by, end is None or end.settled, best, rms, explained,
         float("nan") if end is None else float(np.sqrt(np.mean(end.errors**2))),
         path.tick if path is not None else thinning(records[0].dt) * records[0].dt, end,
-        float(sum((r.last - r.first) * r.dt for r in records)), tuple(r.speed for r in records), records, path,
+        float(sum((r.last - r.first) * r.dt for r in records)), tuple(r.speed for r in records), taken, records, path,
         tuple(log["driver_torque"].source for log in logs if log["driver_torque"].source.startswith("estimate")),
     )  # fmt: skip
 
@@ -145,15 +148,13 @@ def _logarithms(known: TwoPointDriver, names: tuple[str, ...]) -> Array:
     return np.log([max(getattr(known, n), 1e-3) for n in names])
 
 
-def _refuse_rest(record: DriverRecord) -> None:
-    """A drive in which nothing happens tells nothing."""
-    rows = slice(record.first, record.last)
-    bent, torque = float(np.std(record.curvature[rows])), float(np.std(record.torque[rows]))
-    if bent < 1e-5 or torque < 1e-3:
+def _refuse_pieces(drive: DrivePieces) -> None:
+    """The dual filter goes through one stretch."""
+    if len(drive.records) > 1:
         raise LogError(
-            f"{record.source}: a curvature that changes by {bent:.2g} 1/m and a torque that changes by {torque:.2g} N m (sd)",
-            "a drive with curves, and a torque that was measured or estimated",
-            "record such a drive",
+            f"{drive.source}: {holes_told(drive.holes)}",
+            "a drive without holes: the dual filter goes tick by tick",
+            "identify by the road, which takes the pieces together, or cut the log to one of them",
         )
 
 

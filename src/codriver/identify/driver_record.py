@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from codriver.errors import LogError, MissingSignal
+from codriver.identify.driver_holes import LONGEST_HOLE, covered, holes_of, holes_told
 from codriver.models.road_sight import PathAhead, path_errors
 from codriver.signals import Log, Signal
 from codriver.signals.signal import Array
@@ -29,7 +30,6 @@ SLOW = 0.02  # Hz
 LEAST_SECONDS = 60.0
 LEAST_LEFT = 20.0  # s that count
 SLOWEST_RATE, FASTEST_RATE = 20.0, 200.0  # Hz
-LONGEST_HOLE = 0.5  # s
 LEAST_SPEED = 3.0  # m/s
 MOST_SPREAD = 0.05  # of the speed
 
@@ -48,6 +48,7 @@ class DriverRecord:
         summed: offset and heading error are sums, and everything went through the high-pass.
         source: of the log.
         points: near, m, and far, s, of the two directions; `path` and `place`, where the car was on it, m, give those of others.
+        start: of a piece, s from where the drive begins.
     """
 
     near: Array = field(repr=False)
@@ -66,6 +67,7 @@ class DriverRecord:
     points: tuple[float, float]
     path: PathAhead = field(repr=False)
     place: Array = field(repr=False)
+    start: float = 0.0
 
     def seen(self, near: float, far: float) -> tuple[Array, Array]:
         """Directions of two points, rad: m ahead, and s ahead."""
@@ -88,18 +90,10 @@ def driver_record(log: Log, near: float, far: float) -> DriverRecord:
 
     Raises:
         MissingSignal: the log lacks one of them.
-        LogError: the drive is too short, has holes, stands, or its speed varies.
+        LogError: the drive is too short, has holes (`driver_pieces` cuts it there), stands, or its speed varies.
     """
     name = log.source or "this log"
-    summed = not all(n in log for n in WHERE)
-    used = NEEDED + (MOTION if summed else WHERE)
-    lacking = [n for n in used if n not in log]
-    if lacking:
-        raise MissingSignal(
-            f"{name} lacks {', '.join(lacking)}",
-            f"{', '.join(NEEDED)}, and {' and '.join(WHERE)} or {' and '.join(MOTION)}",
-            "map them in a names file; estimate driver_torque and sideslip_angle where no sensor has them",
-        )
+    used, summed = needed(log)
     known = {n: _known(log[n], name) for n in used}
     time, dt = _ticks({n: t for n, (t, _) in known.items()}, log["driver_torque"].rate, name)
     values = {n: np.interp(time, *known[n]) for n in used}
@@ -157,6 +151,26 @@ def driver_record(log: Log, near: float, far: float) -> DriverRecord:
     )
 
 
+def needed(log: Log) -> tuple[tuple[str, ...], bool]:
+    """Names of the signals that are used, and whether offset and heading error are sums of others.
+
+    Raises:
+        MissingSignal: the log lacks some; the message names all of them.
+    """
+    where, motion = ([n for n in names if n not in log] for names in (WHERE, MOTION))
+    lacking = [n for n in NEEDED if n not in log]
+    if where and motion:
+        lacking.append(f"{' and '.join(where)} (or else {' and '.join(motion)})")
+    if lacking:
+        raise MissingSignal(
+            f"{log.source or 'this log'} lacks {', '.join(lacking)}",
+            f"{', '.join(NEEDED)}, and {' and '.join(WHERE)} or else {' and '.join(MOTION)}",
+            "map those that the log has under other names in a names file, names.toml (codriver info LOG lists what it holds), and "
+            "add the others to the log: curvature, offset and heading error come from a simulator, or from a map and a lane camera",
+        )
+    return NEEDED + (MOTION if where else WHERE), bool(where)
+
+
 def _quick(x: Array, dt: float) -> Array:
     """What the high-pass leaves."""
     from scipy.signal import butter, sosfilt
@@ -174,21 +188,17 @@ def _known(signal: Signal, name: str) -> tuple[Array, Array]:
 
 def _ticks(stamps: Mapping[str, Array], rate: float, name: str) -> tuple[Array, float]:
     """Ticks of the torque's rate over the stretch that all signals cover."""
-    from itertools import starmap
-
     rate = min(rate, FASTEST_RATE)
-    start, end = max(t[0] for t in stamps.values()), min(t[-1] for t in stamps.values())
+    start, end = covered(stamps)
     if end - start < LEAST_SECONDS or rate < SLOWEST_RATE:
         raise LogError(
             f"{name}: {max(end - start, 0):.0f} s of all signals, torque at {rate:.3g} Hz",
             f"at least {LEAST_SECONDS:g} s at {SLOWEST_RATE:g} Hz: a driver's delay is 0.1 s",
             "record a longer drive" if rate >= SLOWEST_RATE else "record the torque faster, and a minute of it",
         )
-    holes = {n: float(np.diff(t[(t >= start) & (t <= end)]).max(initial=0.0)) for n, t in stamps.items()}
-    if max(holes.values()) > LONGEST_HOLE:
-        said = ", ".join(starmap("{} {:.1f} s".format, [h for h in holes.items() if h[1] > LONGEST_HOLE]))
+    if holes := holes_of(stamps):
         raise LogError(
-            f"{name}: holes in {said}", f"none above {LONGEST_HOLE:g} s", "cut the log to a stretch without them"
+            f"{name}: {holes_told(holes)}", f"none above {LONGEST_HOLE:g} s", "cut the log to a stretch without them"
         )
     dt = round(1 / rate, 4)
     return start + dt * np.arange(int((end - start) / dt) + 1, dtype=np.float64), dt

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from codriver.errors import LogError
 from codriver.identify.brake_fit import Refusal
 from codriver.identify.driver_dual_ekf import DualFit
+from codriver.identify.driver_pieces import DrivePieces
 from codriver.identify.driver_record import DriverRecord
 from codriver.identify.driver_search import Found
 from codriver.models.two_point import TwoPointDriver
@@ -58,8 +59,8 @@ class DriverFit:
         rms: of the torque that the model does not explain, N m; `explained`: share of the torque's variance that it does.
         one_step: rms of the error one tick of `tick` s ahead, N m.
         found: the search's end: errors one tick ahead, covariances; None if nothing was sought.
-        seconds: of the drives that count; speeds: of each, m/s.
-        records: what was fitted.
+        seconds: of the drives that count; speeds: of each record, m/s.
+        drives: each with its holes and what is left out; records: what was fitted, of all of them.
         path: the parameters over time by the dual filter; None otherwise.
         estimated: sources of torques that are no sensor's, by drive.
     """
@@ -80,6 +81,7 @@ class DriverFit:
     found: Found | None = field(repr=False)
     seconds: float
     speeds: tuple[float, ...]
+    drives: tuple[DrivePieces, ...]
     records: tuple[DriverRecord, ...] = field(repr=False)
     path: DualFit | None = field(repr=False)
     estimated: tuple[str, ...] = ()
@@ -87,7 +89,11 @@ class DriverFit:
     @property
     def source(self) -> str:
         """The drives."""
-        return ", ".join(r.source for r in self.records)
+        return ", ".join(d.source for d in self.drives)
+
+    def speeds_told(self) -> str:
+        """The speeds in words; pieces of a drive mostly share one."""
+        return ", ".join(dict.fromkeys(f"{3.6 * v:.0f}" for v in self.speeds)) + " km/h"
 
     def driver(self) -> TwoPointDriver:
         """The driver found.
@@ -103,9 +109,9 @@ class DriverFit:
             )
         return replace(self.best)
 
-    def torque(self, drive: int = 0) -> Array:
-        """The torque of the driver found on a drive, from what he saw, N m, shape (n,)."""
-        r = self.records[drive]
+    def torque(self, record: int = 0) -> Array:
+        """The torque of the driver found on a drive, or a piece of one, from what he saw, N m, shape (n,)."""
+        r = self.records[record]
         return self.best.torque(*r.seen(self.best.near, self.best.far), r.angle, r.speed, r.dt)
 
     def filed(self, name: str) -> FiledDriver:

@@ -50,7 +50,11 @@ def lasting(fit: DriverFit) -> float:
 
 def driver_findings(fit: DriverFit) -> tuple[Finding, ...]:
     """Judged sentences."""
-    found = [_told(fit), *(f for r in fit.records for f in sign_findings(r))]
+    found = [
+        _told(fit),
+        *(f for d in fit.drives for f in d.findings()),
+        *(f for r in fit.records for f in sign_findings(r)),
+    ]
     if fit.explained < LEAST_EXPLAINED:
         found.append(
             Finding(
@@ -89,7 +93,7 @@ def driver_findings(fit: DriverFit) -> tuple[Finding, ...]:
 def _told(fit: DriverFit) -> Finding:
     told = ", ".join(p.letter for p in fit.parameters.values())
     lacking = ", ".join(LETTERS[r.name][0] for r in fit.refused)
-    drives = "the drive tells" if len(fit.records) == 1 else "the drives tell"
+    drives = "the drive tells" if len(fit.drives) == 1 else "the drives tell"
     if not lacking:
         return Finding("ok", f"{drives} all that was asked for: {told}")
     if not told:

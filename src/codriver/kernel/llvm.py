@@ -17,7 +17,7 @@ import ctypes
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 from codriver.kernel.record import Recorded
@@ -43,14 +43,24 @@ class Compiled:
     engine: Any  # owns the machine code: must live as long as `run`
 
 
-def compile_loop(recorded: Recorded) -> Compiled:
-    """Compile the loop over samples of a recorded step."""
+def compile_loop(recorded: Recorded, *, anew: bool = False) -> Compiled:
+    """Compile the loop over samples of a recorded step.
+
+    Args:
+        recorded: the step.
+        anew: compile it even if the same was compiled lately, to see how long that takes.
+    """
+    level = 2 if recorded.operations() <= QUICK_TO_OPTIMISE else 0
+    return (_compiled.__wrapped__ if anew else _compiled)(print_loop(recorded), level)
+
+
+@lru_cache(maxsize=64)
+def _compiled(text: str, level: int) -> Compiled:
+    """The machine code of a loop printed as LLVM text; it keeps no state of its own, so programs may share it."""
     import llvmlite.binding as llvm
 
-    text = print_loop(recorded)
     module = llvm.parse_assembly(text)
     module.verify()
-    level = 2 if recorded.operations() <= QUICK_TO_OPTIMISE else 0
     machine = _machine(level)
     options = llvm.create_pipeline_tuning_options(speed_level=level)
     builder = llvm.create_pass_builder(machine, options)

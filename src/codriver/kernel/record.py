@@ -124,7 +124,7 @@ def record(
             f"the carry it takes, in its order: {list(carry)}",
             "return every carried scalar, in order",
         )
-    kept = _needed(state, list(new.values()), list(out.values()))
+    kept = _needed(state, given, list(new.values()), list(out.values()))
     results = ca.vertcat(*[ca.SX(list(new.values())[k]) for k in kept]), ca.vertcat(*[ca.SX(v) for v in out.values()])
     taken = ca.vertcat(ca.SX(0, 1), *[state[k] for k in kept])
     function = ca.Function(name, [taken, given], ca.cse(list(results)), ["carry", "input"], ["carry_next", "output"])
@@ -139,21 +139,45 @@ def record(
     )  # fmt: skip
 
 
-def _needed(state: Any, new: Sequence[Scalar], out: Sequence[Scalar]) -> list[int]:
+def _needed(state: Any, given: Any, new: Sequence[Scalar], out: Sequence[Scalar]) -> list[int]:
     """The carried scalars that some output depends on, now or later; what feeds only itself is not computed."""
-    import casadi as ca
-
-    place = {state[k].element_hash(): k for k in range(len(new))}
-
-    def read_by(value: Scalar) -> set[int]:
-        return {place[s.element_hash()] for s in ca.symvar(ca.SX(value)) if s.element_hash() in place}
-
-    needed: set[int] = set()
-    fresh = set().union(*(read_by(value) for value in out))
+    read_by = _read_by(state, given, [*new, *out])
+    needed, fresh = 0, 0
+    for bits in read_by[len(new) :]:
+        fresh |= bits
     while fresh:
         needed |= fresh
-        fresh = set().union(*(read_by(new[k]) for k in fresh)) - needed
-    return sorted(needed)
+        found = 0
+        for k in _places(fresh):
+            found |= read_by[k]
+        fresh = found & ~needed
+    return _places(needed)
+
+
+def _read_by(state: Any, given: Any, values: Sequence[Scalar]) -> list[int]:
+    """Which carried scalars each value is computed from: bit k stands for state[k]. One walk down CasADi's list for all."""
+    import casadi as ca
+
+    function = ca.Function("read_by", [state, given], [ca.densify(ca.vertcat(*[ca.SX(value) for value in values]))])
+    bits: dict[int, int] = {}  # CasADi's work index -> what was read for it
+    found = [0] * len(values)
+    for k in range(function.n_instructions()):
+        code, reads, writes = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
+        if code == ca.OP_OUTPUT:
+            found[writes[1]] = bits[reads[0]]
+        elif code == ca.OP_INPUT:
+            bits[writes[0]] = 1 << reads[1] if reads[0] == 0 else 0
+        else:
+            of = 0
+            for i in reads:
+                of |= bits[i]
+            bits[writes[0]] = of
+    return found
+
+
+def _places(bits: int) -> list[int]:
+    """The places of the bits that are set, ascending."""
+    return [k for k in range(bits.bit_length()) if bits >> k & 1]
 
 
 def _assign_once(name: str, function: Any) -> tuple[list[Instruction], dict[tuple[int, int], int]]:

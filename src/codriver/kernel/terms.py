@@ -40,10 +40,10 @@ class Listing:
         """Append an operation, or find it; numbers among the operands become constants."""
         places = tuple(self.term(operand).place for operand in operands)
         instruction = Instruction(kind, places, value)
-        if instruction not in self._known:
-            self._known[instruction] = len(self.instructions)
+        place = self._known.setdefault(instruction, len(self.instructions))
+        if place == len(self.instructions):
             self.instructions.append(instruction)
-        return Term(self, self._known[instruction])
+        return Term(self, place)
 
     def term(self, value: Term | float) -> Term:
         """A term, or a number as a constant."""

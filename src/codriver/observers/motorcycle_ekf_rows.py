@@ -8,9 +8,10 @@ from codriver.observers.motorcycle_ekf_states import BIASES, LEAN, LEANING, PITC
 
 
 def sensor_function(p: LeanParameters, states: int = N) -> Scalar:
-    """CasADi function: what the rows should show, shape (6, 1), and the derivatives by the state, shape (6, n).
+    """CasADi function of what the sensors should show, h(x), as `motorcycle_ekf` writes it, and H = dh/dx.
 
-    Of the state, (v_y', W', phi'') and their derivatives by the first ten states, v, sin phi, cos phi.
+    It is (x, a, bent, v, sin phi, cos phi) -> (h, H, a_z): a = (v_y', W', phi''), bent its derivatives by the first ten states,
+    shape (3, 10); h as `ROWS`, rad/s, m/s^2, rad, shape (6, 1), H of shape (6, n), a_z in m/s^2.
 
     Args:
         p: the machine.

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from codriver.identify.driver_fit import TOLD
+from codriver.identify.driver_record import DriverRecord
 from codriver.identify.driver_result import WORDS, DriverFit
 from codriver.identify.driver_verdict import driver_findings, error_correlation
 from codriver.identify.standard_errors import Index
@@ -60,9 +61,11 @@ def two_point_document(fit: DriverFit, beside: FiledDriver | None = None, comman
     ]
     if fit.found is not None:
         result.append(_bars(fit, beside))
+    if any(d.holes for d in fit.drives):
+        result.append(_pieces(fit))
     sections = [
         Section("Result", tuple(result)),
-        Section("Measured and modelled torque", tuple(c for d in range(len(fit.records)) for c in _torque(fit, d))),
+        Section("Measured and modelled torque", tuple(c for k in range(len(fit.records)) for c in _torque(fit, k))),
     ]
     if fit.path is not None:
         sections.append(Section("Parameters over time, by dual EKF", (_path(fit, beside),)))
@@ -75,8 +78,8 @@ def two_point_document(fit: DriverFit, beside: FiledDriver | None = None, comman
         "and one of compensation, a delay, and arms (Sentouh et al. 2009, Saleh et al. 2013).",
         tuple(sections),
         (
-            ("drives", ", ".join(Path(r.source).name for r in fit.records)), ("by", WORDS[fit.by]),
-            ("length", f"{fit.seconds / 60:.1f} min"), ("speed", ", ".join(f"{3.6 * v:.0f}" for v in fit.speeds) + " km/h"),
+            ("drives", ", ".join(Path(d.source).name for d in fit.drives)), ("by", WORDS[fit.by]),
+            ("length", f"{fit.seconds / 60:.1f} min"), ("speed", fit.speeds_told()),
             ("left unexplained", f"{fit.rms:.3g} N m"), ("explained of the torque's variance", f"{100 * fit.explained:.1f} %"),
             ("error one tick ahead", f"{fit.one_step:.3g} N m in {1000 * fit.tick:.0f} ms"),
         ),
@@ -103,27 +106,41 @@ def _bars(fit: DriverFit, beside: FiledDriver | None) -> Chart:
     )  # fmt: skip
 
 
-def _torque(fit: DriverFit, drive: int) -> tuple[Chart, Chart]:
+def _pieces(fit: DriverFit) -> Table:
+    """What became of the pieces of drives with holes."""
+    rows: list[tuple[str, ...]] = []
+    for drive in fit.drives:
+        name = Path(drive.source).name
+        made = [(a, b, "yes") for a, b in drive.spans] + [(p.start, p.stop, f"no: {p.why}") for p in drive.left_out]
+        rows += [(name, f"{a:.1f}", f"{b:.1f}", said) for a, b, said in sorted(made)]
+    return Table(
+        ("drive", "from, s", "to, s", "used"),
+        tuple(rows),
+        "Drives are cut where a signal has a hole; each piece settles anew.",
+    )
+
+
+def _torque(fit: DriverFit, record: int) -> tuple[Chart, Chart]:
     """Measured torque, the model's, and the rest, over a drive; and the first stretch of it in detail."""
-    r, made = fit.records[drive], fit.torque(drive)
+    r, made = fit.records[record], fit.torque(record)
     rows = np.arange(r.first, r.last)
     rows = rows[:: max(rows.size // MOST_POINTS, 1)]
     part = np.arange(r.first, min(r.first + round(SHOWN / r.dt), r.last))
     part = part[:: max(part.size // MOST_POINTS, 1)]
     offset = float((r.torque - made)[r.first : r.last].mean())
-    title = Path(r.source).name or f"drive {drive + 1}"
+    title = Path(r.source).name or f"drive {record + 1}"
 
     def both(use: Index) -> tuple[Curve, Curve]:
         return (
-            Curve("measured", _seconds(r.dt, use), r.torque[use], GREY, width=2.5),
-            Curve("model", _seconds(r.dt, use), made[use] + offset, RED),
+            Curve("measured", _seconds(r, use), r.torque[use], GREY, width=2.5),
+            Curve("model", _seconds(r, use), made[use] + offset, RED),
         )
 
     whole = Chart(
         title, "time (s)",
         (
             Plot("torque (N m)", both(rows), 240),
-            Plot("measured - model (N m)", (Curve("", _seconds(r.dt, rows), (r.torque - made)[rows] - offset, BLUE),), 160, (0.0,)),
+            Plot("measured - model (N m)", (Curve("", _seconds(r, rows), (r.torque - made)[rows] - offset, BLUE),), 160, (0.0,)),
         ),
         f"The model's torque comes from what the driver saw and the wheel's angle, without any measured torque; a constant of "
         f"{offset:+.3f} N m is added.",
@@ -131,8 +148,8 @@ def _torque(fit: DriverFit, drive: int) -> tuple[Chart, Chart]:
     return whole, Chart(f"{title}, its first {SHOWN:g} s", "time (s)", (Plot("torque (N m)", both(part), 240),))
 
 
-def _seconds(dt: float, rows: Index) -> Array:
-    return np.asarray(dt * rows, float)
+def _seconds(r: DriverRecord, rows: Index) -> Array:
+    return np.asarray(r.start + r.dt * rows, float)
 
 
 def _path(fit: DriverFit, beside: FiledDriver | None) -> Chart:

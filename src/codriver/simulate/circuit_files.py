@@ -49,7 +49,7 @@ class CircuitFiles:
 
 
 def write_circuit(
-    folder: str | Path, setting: CircuitSetting | None = None, seed: int = 0
+    folder: str | Path, setting: CircuitSetting | None = None, seed: int = 0, name: str | None = None
 ) -> tuple[CircuitFiles, CircuitDrive]:
     """Simulate a drive and write it into a folder, made if need be, whole or not at all.
 
@@ -57,6 +57,7 @@ def write_circuit(
         folder: to write into.
         setting: driver, car, laps.
         seed: of the driver's variability and the sensors' noise.
+        name: as for `write_files`.
 
     Raises:
         UsageError: the folder holds files, and not those of a circuit; or the car leaves the road.
@@ -65,28 +66,31 @@ def write_circuit(
     folder = Path(folder)
     refuse_foreign(folder, "circuit", FILES)
     drive = simulate_circuit(setting, seed=seed)
-    write_folder(folder, lambda scratch: write_files(drive, scratch), "circuit", FILES)
+    write_folder(folder, lambda scratch: write_files(drive, scratch, name=name), "circuit", FILES)
     return CircuitFiles(*(folder / name for name in FILES)), drive
 
 
-def write_files(drive: CircuitDrive, folder: Path, more: Mapping[str, tuple[Array, str]] | None = None) -> None:
+def write_files(
+    drive: CircuitDrive, folder: Path, more: Mapping[str, tuple[Array, str]] | None = None, name: str | None = None
+) -> None:
     """Write the files of FILES.
 
     Args:
         drive: what happened.
         folder: that is there.
         more: columns of the truth by name: values of shape (n,) and unit.
+        name: of the driver; None for that of CIRCUIT_DRIVERS, or "truth" where he is none of these.
     """
     files, log = CircuitFiles(*(folder / name for name in FILES)), drive.log()
     there = [column for column in _COLUMNS if column[0] in log]
     files.drive.write_text(_table(drive.time, log, there), encoding="utf-8")
-    names = "".join(f'[{name}]\nsource = "{column}"\nunit = "{unit}"\n\n' for name, column, unit, _, _ in there)
+    names = "".join(f'[{signal}]\nsource = "{column}"\nunit = "{unit}"\n\n' for signal, column, unit, _, _ in there)
     files.names.write_text(f"# The log of a drive round the simulated circuit.\n{names}", encoding="utf-8")
     truth = drive.truth()
     columns = [Column(signal.name, signal.values, signal.unit) for signal in truth.values()]
-    columns += [Column(name, values, unit) for name, (values, unit) in (more or {}).items()]
+    columns += [Column(signal, values, unit) for signal, (values, unit) in (more or {}).items()]
     filed = FiledDriver.of(
-        drive.setting.driver, name_of(drive.setting.driver) or "truth", f"drove the circuit, seed {drive.seed}"
+        drive.setting.driver, name or name_of(drive.setting.driver) or "truth", f"drove the circuit, seed {drive.seed}"
     )
     save_two_point(filed, files.driver)
     write_table(files.truth, drive.time, columns, {"source": truth.source, "seed": str(drive.seed)})

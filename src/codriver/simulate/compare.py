@@ -39,6 +39,7 @@ TRUTHS: Mapping[Truth, tuple[str, str]] = {
 }
 AFTER = 1.0  # a shift counts from its start to this many seconds after its end
 LONGEST_LAG, LAG_STEP = 2.0, 0.02  # s
+FLAT = 1e-10  # share of a sum of squares below which its spread is rounding
 KNOBLESS = "pedals-only"
 UNMATCHED = (KNOBLESS, "intent-fused", "fused-torque")
 
@@ -145,12 +146,28 @@ def shifting(truth: Log, time: Array, after: float = AFTER) -> Flags:
 
 
 def best_lag(estimate: Array, truth: Array, use: Flags, dt: float) -> tuple[float, float]:
-    """The best correlation of an estimate with an earlier truth over the lags, and the lag, s; over the ticks of `use`."""
+    """The best correlation of an estimate with an earlier truth over the lags, and the lag, s; over the ticks of `use`.
+
+    At lag l, over the n ticks k >= l of `use`, from sums of x_k = estimate_k and y_k = truth_{k-l}, each less its mean over
+    the drive, so that little cancels:
+
+        r = (n S_xy - S_x S_y) / sqrt((n S_xx - S_x^2) (n S_yy - S_y^2))
+    """
     best = (-1.0, 0.0)
+    if not use.any():
+        return best
+    counted = use.astype(float)
+    x = np.where(use, estimate - estimate[use].mean(), 0.0)
+    y = truth - truth.mean()
+    squares = y * y
+    later = [np.cumsum(part[::-1])[::-1] for part in (counted, x, x * x)]  # sums over the ticks from l on
     step = max(1, round(LAG_STEP / dt))
     for lag in range(0, min(round(LONGEST_LAG / dt), truth.size - 2) + 1, step):
-        chosen = use[lag:]
-        x, y = estimate[lag:][chosen], truth[: truth.size - lag][chosen]
-        if x.size > 2 and x.std() > 0 and y.std() > 0:
-            best = max(best, (float(np.corrcoef(x, y)[0, 1]), lag * dt))
+        n, s_x, s_xx = (float(part[lag]) for part in later)
+        earlier, chosen = slice(0, truth.size - lag), counted[lag:]
+        s_y, s_yy, s_xy = chosen @ y[earlier], chosen @ squares[earlier], x[lag:] @ y[earlier]
+        spread_x, spread_y = n * s_xx - s_x * s_x, n * s_yy - s_y * s_y
+        # What rounding leaves of a signal that does not vary is no spread.
+        if n > 2 and spread_x > FLAT * n * s_xx and spread_y > FLAT * n * s_yy:
+            best = max(best, (float((n * s_xy - s_x * s_y) / np.sqrt(spread_x * spread_y)), lag * dt))
     return best

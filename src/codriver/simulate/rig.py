@@ -201,7 +201,10 @@ def simulate_rig(setting: RigSetting | None = None, *, seed: int = 0) -> RigDriv
     A, B = car.matrices()
     dt = s.dt / SUBSTEPS
     tick = tick_of(wheel.inertia, wheel.damping, dt)
-    bend = np.linalg.solve(-A, B)[1] / car.speed  # curvature per rad of road wheel, when all is steady
+    steady: Array = np.asarray(
+        np.linalg.solve(-A, B), dtype=np.float64
+    )  # sideslip angle and yaw rate per rad of road wheel
+    bend = steady[1] / car.speed  # curvature per rad of road wheel, when all is steady
     back = car.alignment / car.ratio
     kept = np.zeros((7, n))
     delta = omega = beta = r = psi = y = hand = want = 0.0
@@ -218,7 +221,7 @@ def simulate_rig(setting: RigSetting | None = None, *, seed: int = 0) -> RigDriv
             next_step = time[k] + driver.step * rng.uniform(0.6, 1.4)
         aligned = back * (beta + car.front * r / car.speed - delta / car.ratio)
         # The arms bear what the tyres will ask for at the wanted angle, and pull the rest of the way.
-        asked = _held(want / car.ratio, car, back, bend) + driver.stiffness * (want - delta) - driver.damping * omega
+        asked = _held(want / car.ratio, car, back, steady) + driver.stiffness * (want - delta) - driver.damping * omega
         hand += s.dt / driver.lag * (asked - hand)
         torque = hand + tremor[k]
         kept[:, k] = delta, omega, aligned, torque, beta, r, y
@@ -233,10 +236,9 @@ def simulate_rig(setting: RigSetting | None = None, *, seed: int = 0) -> RigDriv
     return RigDrive(s, time, measured, kept[0], kept[1], kept[2], kept[3], kept[4], kept[5], here, kept[6])
 
 
-def _held(road: float, car: RigCar, back: float, bend: float) -> float:
-    """Torque that holds a steady angle of the road wheels, N m."""
-    A, B = car.matrices()
-    beta, r = np.linalg.solve(-A, B) * road
+def _held(road: float, car: RigCar, back: float, steady: Array) -> float:
+    """Torque that holds a steady angle of the road wheels, N m; `steady`: sideslip angle and yaw rate per rad of it."""
+    beta, r = steady * road
     return float(-back * (beta + car.front * r / car.speed - road))
 
 

@@ -13,12 +13,13 @@ from codriver.simulate.folder import refuse_foreign, write_folder
 from codriver.simulate.shared_control import SharedDrive
 
 
-def write_shared(folder: str | Path, shared: SharedDrive) -> CircuitFiles:
+def write_shared(folder: str | Path, shared: SharedDrive, name: str | None = None) -> CircuitFiles:
     """Write a drive into a folder, made if need be, whole or not at all.
 
     Args:
         folder: to write into.
         shared: the drive.
+        name: of the driver, as for `circuit_files.write_files`.
 
     Raises:
         UsageError: the folder holds files, and not those of a circuit.
@@ -32,5 +33,5 @@ def write_shared(folder: str | Path, shared: SharedDrive) -> CircuitFiles:
             "driver_torque_ahead": (shared.foretold, "N*m"),
             "driver_torque_ahead_sd": (shared.foretold_sd, "N*m"),
         }
-    write_folder(folder, lambda scratch: write_files(shared.drive, scratch, more), "circuit", FILES)
+    write_folder(folder, lambda scratch: write_files(shared.drive, scratch, more, name), "circuit", FILES)
     return CircuitFiles(*(folder / name for name in FILES))

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -32,7 +33,7 @@ from codriver.observers.jerk_forms import ROWS, STATES, Situation, kalman_update
 from codriver.observers.observer import Observer, Output, Scalars
 from codriver.observers.riccati import stationary_predicted, tick_map
 from codriver.observers.scaled_gain import Preset, scaled_noise
-from codriver.program import compile
+from codriver.program import Program, compile
 from codriver.signals import Grid
 from codriver.signals.signal import Array
 
@@ -92,7 +93,7 @@ class Likelihood:
                 f"{rows} innovations that count, in {self.seconds:.1f} s", f"at least {LEAST_ROWS}",
                 "give longer drives: moving, with all inputs, between gear shifts",
             )  # fmt: skip
-        self._program = compile(_recursion(self.dt))
+        self._program = _program(self.dt)
 
     @property
     def blocks(self) -> int:
@@ -199,6 +200,12 @@ def _noise_of(preset: Preset, ell: float, dt: float) -> dict[str, float]:
         )  # fmt: skip
     values = [*(Qd[i, j] for i, j in _PAIRS), *Rd, *np.diag(P)]
     return dict(zip(_NOISE, (float(value) for value in values), strict=True))
+
+
+@cache
+def _program(dt: float) -> Program:
+    """The recursion, compiled: one machine code for all drives and noises."""
+    return compile(_recursion(dt))
 
 
 def _recursion(dt: float) -> Observer:
