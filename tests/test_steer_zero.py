@@ -21,6 +21,7 @@ from codriver.observers import build
 from codriver.observers.steer_zero import SteerZero
 from codriver.simulate.motorcycle import RideSetting, simulate_ride
 from codriver.simulate.motorcycle.files import nominal_vehicle, write_ride
+from codriver.testing import check_observer
 from codriver.vehicles import load_vehicle, save_vehicle
 
 DEGREE = np.pi / 180
@@ -203,6 +204,12 @@ class TestCommandLine:
         assert SteerZero.from_vehicle(load_vehicle(machine)).value == pytest.approx(
             second["steer_zero"]["degrees"] * DEGREE, rel=1e-3
         )
+
+
+@pytest.mark.slow
+def test_checklist(vehicle):
+    """Live as batch, with a zero taken out and the rest as a state."""
+    check_observer(build("motorcycle-ekf", told(vehicle, 0.5, 0.5)), rows=40)
 
 
 @pytest.mark.slow
