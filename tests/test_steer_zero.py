@@ -145,6 +145,11 @@ class TestFound:
 
 
 class TestVerdict:
+    def test_a_right_value_is_said(self, slalom, vehicle):
+        found = cd.estimate_log("motorcycle-kalman", turned(slalom.log(), 1.0), told(vehicle, 1.0))
+        said = [f.text for f in found.check().findings if "zero" in f.text]
+        assert said == ["the steering encoder's zero, 1.00 deg as told, is taken out"]
+
     def test_a_wrong_value_is_told(self, slalom, vehicle):
         found = cd.estimate_log("motorcycle-ekf", turned(slalom.log(), 1.0), told(vehicle, -0.5))
         said = [f.text for f in found.check().findings if "off its zero" in f.text]

@@ -210,18 +210,21 @@ def _zero(blocks: Values, values: Values, used: set[str]) -> list[Finding]:
         sd = float(values["steer_offset_sd"][-1]) if values["steer_offset_sd"].size else np.inf
         said = f"the steering encoder's zero, {told / DEGREE:.2f} deg with a standard deviation of {sd / DEGREE:.2g}, is taken out"
         return [Finding("ok", said)] if sd < SURE else []
+    fine = (
+        [Finding("ok", f"the steering encoder's zero, {told / DEGREE:.2f} deg as told, is taken out")] if told else []
+    )
     if not {"course", "yaw_rate"} <= set(blocks):
-        return []
+        return fine
     there = np.isfinite(blocks["course"]) & np.isfinite(blocks["yaw_rate"])
     y, X = blocks["course"][there], np.column_stack([blocks["yaw_rate"], blocks[SPEED]])[there]
     if y.size < LEAST or X[:, 0].std() < TURNING:
-        return []
+        return fine
     normal = np.linalg.inv(X.T @ X)
     fitted = normal @ X.T @ y
     sd = float(np.sqrt(normal[1, 1] * np.sum((y - X @ fitted) ** 2) / (y.size - 2)))
     zero = float(fitted[1])
     if abs(zero - told) < max(OFF, SURELY * sd) or _goes_with(X[:, 0], y - zero * X[:, 1]) < 1 - LOOSE:
-        return []
+        return fine
     mend = "auto" if "lateral_acceleration" in used else f"{zero / DEGREE:.2g}"
     return [Finding(
         "bad",
