@@ -1,6 +1,7 @@
 """The driver models of 2019 without its leaks: errors on a simulated driver who varies, as a fraction of "the torque stays".
 
-Past-only features, no road ahead, five rows a second of one lap each way (4 minutes), four quarters held out in turn; three seeds.
+Past-only features, no road ahead, five rows a second of one lap each way (4 minutes), four quarters held out in turn; three
+seeds, or one where a model is dear and its error hardly differs between them.
 """
 
 from functools import cache
@@ -12,6 +13,7 @@ from codriver.drivers.learned import PROTOCOLS, Protocol, evaluate
 from driven import driven
 
 SEEDS = (1, 2, 3)
+ONE = SEEDS[:1]
 PAST = Protocol().with_features(dense=False, substeps=1, preview=0.0)
 PAPER = PROTOCOLS["paper2019"]
 # Of the paper: 21 components, covariances not regularised.
@@ -20,13 +22,17 @@ BARE = (("alpha", 1e-8),)  # a network without weight decay
 
 
 @cache
+def ratio(kind, protocol, options, seed):
+    """RMSE over that of "the torque stays" on one drive."""
+    drive = {"anna": driven(seed=seed)}
+    return evaluate(drive, [kind], protocol=protocol, options={kind: dict(options)}, calibrate=False).mean(
+        kind, "ratio"
+    )
+
+
 def ratios(kind, protocol=PAST, options=(), seeds=SEEDS):
-    """RMSE over that of "the torque stays", a seed each."""
-    drives = [driven(seed=seed) for seed in seeds]
-    made = [
-        evaluate({"anna": d}, [kind], protocol=protocol, options={kind: dict(options)}, calibrate=False) for d in drives
-    ]
-    return np.array([e.mean(kind, "ratio") for e in made])
+    """The same, a seed each."""
+    return np.array([ratio(kind, protocol, options, seed) for seed in seeds])
 
 
 class TestHonest:
@@ -40,9 +46,9 @@ class TestHonest:
 
     @pytest.mark.slow
     def test_gaussian_process(self):
-        """The paper's: no mean, one length, all rows. Two seeds: it takes longer than all others together."""
+        """The paper's: no mean, one length, all rows. .853, .843, .853 on the three seeds."""
         paper = (("mean", "zero"), ("ard", False), ("full_up_to", 1200))
-        assert ratios("gp", options=paper, seeds=SEEDS[:2]).mean() <= 0.88
+        assert ratios("gp", options=paper, seeds=ONE).mean() <= 0.88
 
     def test_network_is_as_good_as_ridge(self):
         assert np.abs(ratios("ann") / ratios("ridge") - 1).max() <= 0.10
@@ -53,7 +59,7 @@ class TestHonest:
     @pytest.mark.slow
     def test_fixed_number_of_components_is_what_costs(self):
         """21 components on 4 minutes; the number by BIC shows that the method is not to blame."""
-        assert ratios("gmr", options=FIXED).mean() >= 1.3 * ratios("gmr").mean()
+        assert ratios("gmr", options=FIXED, seeds=ONE).mean() >= 1.3 * ratios("gmr", seeds=ONE).mean()
 
 
 class TestPapersProtocol:
@@ -66,13 +72,13 @@ class TestPapersProtocol:
     def test_flatters_all(self):
         """The same models on the same drives, by what their features know."""
         for kind in ("ridge", "ann"):
-            assert ratios(kind, PAPER).max() < 0.5 * ratios(kind).min(), kind
+            assert ratios(kind, PAPER, seeds=ONE).max() < 0.5 * ratios(kind).min(), kind
 
     @pytest.mark.slow
     def test_what_the_network_is_worth_hangs_on_its_weight_decay(self):
         """Where the label is a linear function of the features, decay is most of the network's error; asked honestly it helps."""
-        free = {p: ratios("ann", p, BARE).mean() for p in (PAPER, PAST)}
-        assert free[PAPER] < 0.8 * ratios("ann", PAPER).mean()
-        assert free[PAST] > ratios("ann", PAST).mean()
+        free, decayed = ({p: ratios("ann", p, options, ONE).mean() for p in (PAPER, PAST)} for options in (BARE, ()))
+        assert free[PAPER] < 0.8 * decayed[PAPER]
+        assert free[PAST] > decayed[PAST]
         assert free[PAST] <= 0.82
-        assert abs(free[PAST] / ratios("ridge").mean() - 1) <= 0.10
+        assert abs(free[PAST] / ratios("ridge", seeds=ONE).mean() - 1) <= 0.10

@@ -13,7 +13,7 @@ about what the machine takes to lean.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import atan, cos, hypot, sin, sqrt
 
@@ -110,9 +110,10 @@ class Rider:
         if self._hands is None:
             self._hands = Hands(self.machine, self.feels_forces, self.delay, dt)
         moving = road_state(p.h, state)
-        v = hypot(state[X_RATE], state[Y_RATE])
-        self._distance = self.path.locate(*road_point(p.h, state), self._distance)[0]
-        wanted = self._lean_for_path(state, v, moving[2]) if self.lean is None else self.lean(time)
+        here: list[float] = state.tolist()  # Python's own numbers, which are faster one by one
+        v = hypot(here[X_RATE], here[Y_RATE])
+        self._distance = self.path.locate(*road_point(p.h, here), self._distance)[0]
+        wanted = self._lean_for_path(here, v, float(moving[2])) if self.lean is None else self.lean(time)
         wanted = min(max(wanted, -self.steepest), self.steepest)
         feet = min(max((FEET_UP - v) / (FEET_UP - FEET_DOWN), 0.0), 1.0)
         self._wanted += dt / self.smoothing * ((1 - feet) * wanted - self._wanted)
@@ -122,11 +123,11 @@ class Rider:
             fade = dt / REMNANT_TIME
             self._beside += sqrt(2 * fade) * self.remnant * self._noise.standard_normal() - fade * self._beside
         given["rider_torque"] = torque + self._beside
-        given["roll_moment"] = -feet * (FEET[0] * state[ROLL] + FEET[1] * state[ROLL_RATE])
+        given["roll_moment"] = -feet * (FEET[0] * here[ROLL] + FEET[1] * here[ROLL_RATE])
         body = parameters.upper_body
         if body is not None:
             given["lean_torque"] = (body.stiffness - body.mass * p.g * body.above) * self.body * self._wanted
-        now, ahead = self.speed(time, self._distance), state[X_RATE] * cos(state[YAW]) + state[Y_RATE] * sin(state[YAW])
+        now, ahead = self.speed(time, self._distance), here[X_RATE] * cos(here[YAW]) + here[Y_RATE] * sin(here[YAW])
         wish = (self.speed(time + 0.05, self._distance + 0.05 * v) - now) / 0.05 + (now - ahead) / self.speed_time
         wanted_push = p.mass * wish + parameters.air_density * parameters.drag_area / 2 * v * v
         self._push += dt / WRIST_TIME * (wanted_push - self._push)
@@ -137,7 +138,7 @@ class Rider:
         )
         return np.array([given[name] for name in INPUTS])
 
-    def _lean_for_path(self, state: Array, v: float, aside: float) -> float:
+    def _lean_for_path(self, state: Sequence[float], v: float, aside: float) -> float:
         """Roll, rad, whose balanced turn brings the road point back to the path.
 
         Args:
@@ -158,7 +159,7 @@ class Rider:
         return -atan(acceleration / p.g) / (1 + more)
 
 
-def road_point(height: float, state: Array) -> tuple[float, float]:
+def road_point(height: float, state: Sequence[float] | Array) -> tuple[float, float]:
     """The point on the road below the rear frame's mass centre were it upright, m.
 
     Args:
