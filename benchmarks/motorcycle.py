@@ -24,7 +24,8 @@ from measure import measure as timed
 import codriver as cd
 from codriver.models import MotorcycleParameters, motorcycle_model
 from codriver.models.motorcycle_lean import LeanParameters
-from codriver.observers.motorcycle_ekf import ROWS, STATES, motorcycle_ekf
+from codriver.observers.motorcycle_ekf import motorcycle_ekf
+from codriver.observers.motorcycle_ekf_states import ROWS, STATES
 from codriver.observers.motorcycle_kalman import SENSED, motorcycle_kalman
 from codriver.observers.motorcycle_lmi import design_motorcycle_lmi
 from codriver.observers.motorcycle_ts import motorcycle_ts_observer

@@ -15,7 +15,9 @@ from codriver.models.lpv import LPV
 from codriver.models.motorcycle_lean import LeanParameters, lean_functions
 from codriver.models.road_frame import by_turn
 from codriver.observers import motorcycle_ekf as ekf
+from codriver.observers import motorcycle_ekf_states as states
 from codriver.observers import motorcycle_kalman as kalman
+from codriver.observers.motorcycle_ekf_rows import sensor_function
 from codriver.observers.motorcycle_lmi import MotorcycleLMI
 from codriver.observers.sample_scatter import PRIOR
 from codriver.observers.series import series
@@ -131,10 +133,10 @@ def filterpy_kalman(model: LPV, dt: float, terms: int) -> Work:
 def numpy_ekf(p: LeanParameters, dt: float, terms: int) -> Work:
     """The large-angle filter, joint updates; rates, Jacobian and rows by CasADi's functions, called a tick."""
     rates, linear = lean_functions(p)
-    show, noise = ekf.sensor_function(p), ekf.EkfNoise()
+    show, noise = sensor_function(p), states.EkfNoise()
     Q, floors = np.diag(noise.process() * dt), np.array(list(noise.floors(dt).values()))
-    fade, decay = np.exp(-ekf.TRACKING * dt), np.zeros(ekf.N)
-    decay[[ekf.MOMENT, ekf.PITCHING]] = -1 / ekf.MOMENT_TIME, -1 / ekf.PITCH_TIME
+    fade, decay = np.exp(-ekf.TRACKING * dt), np.zeros(states.N)
+    decay[[ekf.MOMENT, ekf.PITCHING]] = -1 / states.MOMENT_TIME, -1 / states.PITCH_TIME
     share = p.sharp.load / (p.sharp.mass * p.sharp.g)
 
     def work(rows: np.ndarray) -> np.ndarray:
@@ -142,10 +144,10 @@ def numpy_ekf(p: LeanParameters, dt: float, terms: int) -> Work:
         v, dv = speed[0], 0.0
         lean = np.arcsin((y[0, 3] - v * y[0, 2]) / p.sharp.g)
         turn = y[0, 2] / np.cos(lean)
-        x, P, var = np.zeros(ekf.N), np.diag(np.square(ekf.START)), np.square(list(ekf.SCATTER.values()))
+        x, P, var = np.zeros(states.N), np.diag(np.square(states.START)), np.square(list(ekf.SCATTER.values()))
         x[[0, 1, 3, 4]] = lean, y[0, 5], turn, y[0, 0]
         x[6:8] = p.sharp.mass * v * turn * np.array([share, 1 - share])
-        whole, out = np.zeros((ekf.N, ekf.N)), np.empty((len(rows), ekf.N))
+        whole, out = np.zeros((states.N, states.N)), np.empty((len(rows), states.N))
         for k in range(len(rows)):
             if k:
                 ahead = v + dt * dv
@@ -158,7 +160,7 @@ def numpy_ekf(p: LeanParameters, dt: float, terms: int) -> Work:
                 whole[: ekf.MOVING, : ekf.LEAN] = A
                 rate = decay * x
                 rate[: ekf.MOVING] = np.array(f).ravel()
-                F = np.eye(ekf.N) + series(whole, whole, dt, terms)
+                F = np.eye(states.N) + series(whole, whole, dt, terms)
                 x, P = x + series(whole, rate, dt, terms), F @ P @ F.T + Q
                 S, C = np.sin(x[0]), np.cos(x[0])
                 now = rates(x[: ekf.LEAN], v, dv, S, C)[2:5]
@@ -167,7 +169,7 @@ def numpy_ekf(p: LeanParameters, dt: float, terms: int) -> Work:
                 R[[0, 2]] += (noise.tilt * x[[3, 4]]) ** 2 * 2 * ekf.TILT_TIME / dt
                 R[4] += float(noise.heave * heave[0, 0]) ** 2 * 2 * ekf.HEAVE_TIME / dt
                 K = np.linalg.solve(H @ P @ H.T + np.diag(R), H @ P).T
-                x, P = x + K @ (y[k] - expected.ravel()), (np.eye(ekf.N) - K @ H) @ P
+                x, P = x + K @ (y[k] - expected.ravel()), (np.eye(states.N) - K @ H) @ P
             out[k] = x
         return out
 

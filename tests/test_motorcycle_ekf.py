@@ -41,7 +41,8 @@ def textbook(
     speed = grid.values[ekf.SPEED]
     v, dv, fade = speed[0], 0.0, np.exp(-ekf.TRACKING * dt)
     var, floors = np.square(list(ekf.SCATTER.values())), np.array(list(noise.floors(dt).values()))
-    decay = np.zeros(16)
+    n_x = len(noise.states)
+    decay = np.zeros(n_x)
     decay[9:11] = -1 / ekf.MOMENT_TIME, -1 / ekf.PITCH_TIME
 
     def rate(x):
@@ -61,14 +62,16 @@ def textbook(
         acc = np.array([dv - x[3] * x[2], a[0] + v * x[3], g]) + r2 + np.cross([0, 0, a[1]], r)
         acc += 2 * np.cross(W, r1) + np.cross(W, np.cross(W, r))
         body = np.array([[0, C, S], [0, -S, C]]) @ acc
-        return np.array([x[4], x[10] + x[3] * S, x[3] * C, *body, x[1]]) + np.array([*x[11:16], 0])
+        return np.array([x[4], x[10] + x[3] * S, x[3] * C, *body, x[1]]) + np.array(
+            [*x[11:16], *(x[16:] if n_x > 16 else [0])]
+        )
 
     def bent(function, x):
         h = 1e-6 * np.maximum(1, np.abs(x))
         return np.column_stack([(function(x + e) - function(x - e)) / (2 * e.sum()) for e in np.diag(h)])
 
     lean = np.arcsin((y[0, 3] - v * y[0, 2]) / g)
-    x, P = np.zeros(16), np.diag(np.square(ekf.START))
+    x, P = np.zeros(n_x), np.diag(np.square(noise.start()))
     turn = y[0, 2] / np.cos(lean)
     share = p.sharp.load / (p.sharp.mass * g)
     x[[0, 1, 3, 4]] = lean, y[0, 5], turn, y[0, 0]
@@ -83,10 +86,10 @@ def textbook(
                 bend = y[k, :5] - 2 * y[k - 1, :5] + y[k - 2, :5]
                 var = var + (bend**2 / 6 - var) / (min(k, ekf.SCATTER_TIME / dt) + 10)
             A, now = bent(rate, x), rate(x)
-            whole = np.zeros((17, 17))
-            whole[:16, :16], whole[:16, 16] = A, now
+            whole = np.zeros((n_x + 1, n_x + 1))
+            whole[:n_x, :n_x], whole[:n_x, n_x] = A, now
             moved = expm(whole * dt)
-            x, F = x + moved[:16, 16], moved[:16, :16]
+            x, F = x + moved[:n_x, n_x], moved[:n_x, :n_x]
             P = F @ P @ F.T + np.diag(noise.process() * dt)
             R = floors + np.append(var, 0)
             R[[0, 2]] += (noise.tilt * x[[3, 4]]) ** 2 * 2 * ekf.TILT_TIME / dt
@@ -102,14 +105,15 @@ def textbook(
 
 
 class TestAgainstTextbook:
-    def test_states_and_bands(self, parameters, program):
+    @pytest.mark.parametrize("zero", [0.0, 0.5 * DEGREE])
+    def test_states_and_bands(self, parameters, zero):
         """From the middle of a turn; ours has one derivative from the tick's start."""
         done, dt, count = leaning_ride(), 0.005, 60
         log = ride_log(done, noisy(done), start=1300)
-        noise = ekf.EkfNoise()
-        found = program.run(log)
+        noise = ekf.EkfNoise(zero=zero)
+        found = cd.compile(ekf.motorcycle_ekf(parameters, dt, noise=noise)).run(log)
         x, sd = textbook(parameters, log, dt, count, noise)
-        for i, name in enumerate(ekf.STATES):
+        for i, name in enumerate(noise.states):
             size = sd[-1, i] if i else np.hypot(sd[-1, i], noise.share * x[-1, i])  # what is told beside, not carried
             assert np.abs(found[name].values[:count] - x[:, i]).max() < 0.05 * sd[:, i].max(), name
             assert found.columns[f"{name}_sd"][count - 1] == pytest.approx(size, rel=0.01), name

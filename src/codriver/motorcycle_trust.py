@@ -39,7 +39,8 @@ AGAINST, LOOSE, WITH = -0.4, 0.3, 0.5  # correlations
 TIMES = 12.0  # roll rate and turn may differ by so much, degrees and radians by 57
 SHORT, LONG = 0.25, 12.0  # m, speed times steer angle over yaw rate; 1 to 4 in the rides we have
 UPWARDS = (0.75 * GRAVITY, 2.0 * GRAVITY)  # medians
-OFF, SURELY = 0.25 * np.pi / 180, 4.0  # rad, standard errors: the encoder's zero
+DEGREE = np.pi / 180
+OFF, SURELY, SURE = 0.25 * DEGREE, 4.0, 0.15 * DEGREE  # rad, standard errors, rad: the encoder's zero
 ROLLED, BIASED = 1.5, 2 * np.pi / 180  # rad, rad/s: roll rate added up, and its mean
 Values = Mapping[str, Array]
 
@@ -201,23 +202,35 @@ def _bends(blocks: dict[str, Array], used: set[str]) -> list[Finding]:
 
 
 def _zero(blocks: Values, values: Values, used: set[str]) -> list[Finding]:
-    """Whether the steering encoder is off its zero, with an estimator that takes it as it is."""
-    if "steer_angle" not in used or "steer_offset" in values or not {"course", "yaw_rate"} <= set(blocks):
+    """Whether the steering encoder is off its zero, with an estimator that takes it as it is or as it was told."""
+    if "steer_angle" not in used:
         return []
+    told = float(values["steer_offset"][-1]) if "steer_offset" in values and values["steer_offset"].size else 0.0
+    if "steer_offset_sd" in values:  # found while it ran
+        sd = float(values["steer_offset_sd"][-1]) if values["steer_offset_sd"].size else np.inf
+        said = f"the steering encoder's zero, {told / DEGREE:.2f} deg with a standard deviation of {sd / DEGREE:.2g}, is taken out"
+        return [Finding("ok", said)] if sd < SURE else []
+    fine = (
+        [Finding("ok", f"the steering encoder's zero, {told / DEGREE:.2f} deg as told, is taken out")] if told else []
+    )
+    if not {"course", "yaw_rate"} <= set(blocks):
+        return fine
     there = np.isfinite(blocks["course"]) & np.isfinite(blocks["yaw_rate"])
     y, X = blocks["course"][there], np.column_stack([blocks["yaw_rate"], blocks[SPEED]])[there]
     if y.size < LEAST or X[:, 0].std() < TURNING:
-        return []
+        return fine
     normal = np.linalg.inv(X.T @ X)
     fitted = normal @ X.T @ y
     sd = float(np.sqrt(normal[1, 1] * np.sum((y - X @ fitted) ** 2) / (y.size - 2)))
     zero = float(fitted[1])
-    if abs(zero) < max(OFF, SURELY * sd) or _goes_with(X[:, 0], y - zero * X[:, 1]) < 1 - LOOSE:
-        return []
+    if abs(zero - told) < max(OFF, SURELY * sd) or _goes_with(X[:, 0], y - zero * X[:, 1]) < 1 - LOOSE:
+        return fine
+    mend = "auto" if "lateral_acceleration" in used else f"{zero / DEGREE:.2g}"
     return [Finding(
         "bad",
-            f"steer_angle is off its zero by {zero * 180 / np.pi:.2g} deg, by speed and yaw rate in bends; a tenth of a degree "
-            "may cost a degree of roll: take it out by offset in the names file",
+            f"steer_angle is off its zero by {zero / DEGREE:.2g} deg, by speed and yaw rate in bends"
+            + (f", where {told / DEGREE:.2g} was told" if told else "")
+            + f"; a tenth of a degree may cost a degree of roll: --steer-zero {mend} takes it out",
     )]  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from codriver.cli.options import Bus, Dbc, Ell, EstimatorName, Form, Json, LogPath, Names, PresetName, VehicleName
+from codriver.cli.steer_zero import SteerZeroText
 
 if TYPE_CHECKING:
     from codriver.estimate import Estimate
@@ -37,6 +38,7 @@ def estimate(
     bus: Bus = None,
     report: Annotated[Path | None, typer.Option("--report", help="Report to write (HTML).", show_default=False)] = None,
     json: Json = False,
+    steer_zero: SteerZeroText = None,
 ) -> None:
     """Estimate what the driver intends, or does at the steering wheel, or how a motorcycle leans, from a recorded drive.
 
@@ -44,7 +46,9 @@ def estimate(
     codriver estimate driver-torque drive.csv --names names.toml --vehicle wheel.toml -o torque.parquet;
     codriver estimate motorcycle ride.csv --names names.toml --vehicle sharp1971 -o lean.parquet
     """
-    estimate_file(estimator, log, out, vehicle, dbc, names, ell, rate, preset, form, bus, report, json)
+    estimate_file(
+        estimator, log, out, vehicle, dbc, names, ell, rate, preset, form, bus, report, json, steer_zero=steer_zero
+    )
 
 
 def estimate_file(
@@ -63,9 +67,11 @@ def estimate_file(
     as_json: bool = False,
     truth: Log | None = None,
     work: Callable[..., Estimate] | None = None,
+    steer_zero: str | None = None,
 ) -> Estimate:
     """What the command does; the demo calls it too, with the truth for its report, and `smooth`, with its own `work`."""
     from codriver.cli.options import check_inputs
+    from codriver.cli.steer_zero import parse_steer_zero, tell_steer_zero, with_steer_zero
     from codriver.cli.terminal import command_line, say, working
     from codriver.logs import read
     from codriver.run import check_rate, choose, estimate_log
@@ -74,19 +80,22 @@ def estimate_file(
     check_inputs(path, dbc, names)
     _check_outputs(out, report, path)
     check_rate(rate)
+    parse_steer_zero(steer_zero)
     vehicle = load_vehicle(vehicle_name) if vehicle_name is not None else None
     with working(not as_json, 3) as stage:
         stage(f"reading {path.name}")
         recorded = read(path, dbc=dbc, names=names, bus=bus)
         name, why = choose(estimator, recorded, vehicle)
         stage(f"estimating: {name}")
+        if steer_zero is not None:
+            vehicle = with_steer_zero(steer_zero, name, recorded, vehicle, rate)
         run = work or estimate_log
         result = run(name, recorded, vehicle, ell=ell, rate=rate, preset=preset, form=form)
         _refuse_empty(result)
         check = check_with_vehicle(result, recorded, vehicle)
         stage(f"writing {out.name}" + (f" and {report.name}" if report is not None else ""))
         _write(result, check, out, report, command_line(), truth)
-    told = _told(result, check, out, report, why)
+    told = {**_told(result, check, out, report, why), **tell_steer_zero(result, check, steer_zero)}
     if as_json:
         typer.echo(json_module.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
     else:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from codriver.cli.options import Ell, EstimatorName, Form, PresetName, VehicleName
+from codriver.cli.steer_zero import SteerZeroText
 
 app = typer.Typer(help="Export an estimator for a control unit.", no_args_is_help=True, rich_markup_mode=None)
 
@@ -22,8 +23,10 @@ def export_c_files(
     ell: Ell = None,
     preset: PresetName = None,
     form: Form = "kalman",
+    steer_zero: SteerZeroText = None,
 ) -> None:
     """Write an estimator as C99: header, source, check program with golden vectors, Makefile, README."""
+    from codriver.cli.steer_zero import with_steer_zero
     from codriver.cli.terminal import console
     from codriver.errors import UsageError
     from codriver.export import export_c
@@ -38,6 +41,8 @@ def export_c_files(
             f"name one: {', '.join(e.name for e in ESTIMATORS.values() if e.family == estimator)}",
         )
     car = load_vehicle(vehicle) if vehicle is not None else None
+    if steer_zero is not None:
+        car = with_steer_zero(steer_zero, estimator, None, car)
     observer = build(estimator, car, dt=dt, ell=ell, preset=preset, form=form)
     files = export_c(compile(observer), out, real)
     screen = console()

@@ -81,6 +81,10 @@ def say(summary: dict[str, Any]) -> None:
     out.print(table)
     out.print(f"\n[bold]verdict[/]: {summary['verdict']}")
     say_findings(out, summary["findings"])
+    if "mend" in summary:
+        out.print(f"\nto take the encoder's zero out:\n{summary['mend']}", markup=False)
+    if "vehicle_file" in summary:
+        out.print(f"\nfor live and C, in the vehicle file:\n{summary['vehicle_file']}", markup=False)
     out.print(
         f"\nwrote {escape(summary['result'])}" + (f" and {escape(summary['report'])}" if summary["report"] else "")
     )

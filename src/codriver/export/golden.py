@@ -6,6 +6,7 @@ from math import inf
 
 import numpy as np
 
+from codriver.models.road_frame import GRAVITY
 from codriver.names import VOCABULARY
 from codriver.program import Program
 from codriver.signals import Grid
@@ -50,7 +51,26 @@ def golden_inputs(program: Program, rows: int = ROWS, seed: int = 7) -> Grid:
             top = 0.2 * high
             walk = np.cumsum(rng.standard_normal(rows)) * top / 20
             column = np.clip(np.abs(walk) if low > -0.1 * high else walk, max(low, -top), top)
-        values[name] = column.astype(np.float32).astype(np.float64)
+        values[name] = column
         fresh[name] = rng.random(rows) < 0.7
         held[name] = (rng.random(rows) < 0.97) & (np.arange(rows) > 3)
+    if "roll_rate" in values:
+        values |= {name: column for name, column in _leaning(speed, observer.dt, rng).items() if name in values}
+    values = {name: column.astype(np.float32).astype(np.float64) for name, column in values.items()}
     return Grid(observer.dt * np.arange(rows, dtype=np.float64), observer.dt, values, fresh, held)
+
+
+def _leaning(speed: Array, dt: float, rng: np.random.Generator) -> dict[str, Array]:
+    """What a two-wheeler shows that leans to either side and turns as it leans.
+
+    Signals that wander on their own would lay it down, where a filter of its lean is at its bounds and float and double part.
+    """
+    t = dt * np.arange(speed.size)
+    lean, rolling = 0.4 * np.sin(np.pi * t), 0.4 * np.pi * np.cos(np.pi * t)
+    turn = -GRAVITY * np.tan(lean) / np.maximum(speed, 4.0)
+    noise = 0.005 * rng.standard_normal((6, speed.size))
+    return {
+        "roll_rate": rolling + noise[0], "pitch_rate": turn * np.sin(lean) + noise[1], "yaw_rate": turn * np.cos(lean) + noise[2],
+        "lateral_acceleration": 5 * noise[3], "vertical_acceleration": GRAVITY / np.cos(lean) + 5 * noise[4],
+        "steer_angle": 1.5 * turn / np.maximum(speed, 4.0) + 0.1 * noise[5],
+    }  # fmt: skip

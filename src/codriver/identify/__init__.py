@@ -12,6 +12,7 @@ from codriver.identify.learning import LearningPoint
 from codriver.identify.pedal import PedalFit, identify_pedal
 from codriver.identify.ratio import GearRatio, RatioFit, identify_ratio
 from codriver.identify.steer_row_fit import SteerRecord, SteerRowFit, fit_steer_row, steer_record
+from codriver.identify.steer_zero import find_steer_zero
 from codriver.identify.steering_result import SteeringFit
 from codriver.identify.steering_wheel import identify_steering_wheel
 from codriver.identify.torque_scale import TorqueScale, identify_torque_scale
@@ -34,6 +35,7 @@ __all__ = [
     "StiffnessFit",
     "TorqueScale",
     "check_vehicle_against_log",
+    "find_steer_zero",
     "fit_steer_row",
     "identify_alignment",
     "identify_alignment_stiffness",

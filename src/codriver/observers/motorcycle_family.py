@@ -28,9 +28,10 @@ from codriver.models.lpv import LPV
 from codriver.models.motorcycle import LETTERS, MotorcycleParameters, motorcycle_model
 from codriver.models.motorcycle_lean import LeanParameters
 from codriver.observers.bicycle_kalman import NEEDED as BICYCLE_NEEDED
-from codriver.observers.bicycle_kalman import bicycle_kalman
+from codriver.observers.bicycle_kalman import BicycleNoise, bicycle_kalman
 from codriver.observers.differentiator import algebraic_differentiator
 from codriver.observers.motorcycle_ekf import NEEDED, motorcycle_ekf
+from codriver.observers.motorcycle_ekf_states import EkfNoise
 from codriver.observers.motorcycle_imu import crown_correction, motorcycle_imu
 from codriver.observers.motorcycle_kalman import motorcycle_kalman
 from codriver.observers.motorcycle_lmi import MotorcycleLMI, design_motorcycle_lmi
@@ -39,6 +40,7 @@ from codriver.observers.motorcycle_uio import design_motorcycle_uio, motorcycle_
 from codriver.observers.observer import Observer, Scalars, chain
 from codriver.observers.registry import Design, Estimator, register
 from codriver.observers.road_frame import road_frame_observer
+from codriver.observers.steer_zero import SteerZero, without_zero
 from codriver.vehicles import Vehicle
 
 FAMILY = "motorcycle"
@@ -55,7 +57,8 @@ UNBALANCED, SLOWEST, DISCS = 0.7, 0.1, (160.0, 200.0, 250.0, 300.0)  # m/s^2, 1/
 
 def _ekf(vehicle: Vehicle | None, design: Design) -> Observer:
     assert vehicle is not None
-    return _of(vehicle, motorcycle_ekf(LeanParameters.from_vehicle(vehicle), design.dt))
+    noise = EkfNoise(zero=SteerZero.from_vehicle(vehicle).sd)
+    return _of(vehicle, motorcycle_ekf(LeanParameters.from_vehicle(vehicle), design.dt, noise=noise))
 
 
 def _kalman(vehicle: Vehicle | None, design: Design) -> Observer:
@@ -103,7 +106,11 @@ def _uio(vehicle: Vehicle | None, design: Design) -> Observer:
 def _bicycle(vehicle: Vehicle | None, design: Design) -> Observer:
     assert vehicle is not None
     friction = vehicle.number("steer_friction") if "steer_friction" in vehicle else 0.0
-    return _of(vehicle, bicycle_kalman(BicycleParameters.from_vehicle(vehicle), design.dt, friction=friction))
+    sd = SteerZero.from_vehicle(vehicle).sd
+    noise = BicycleNoise(offset_start=sd) if sd else BicycleNoise()
+    return _of(
+        vehicle, bicycle_kalman(BicycleParameters.from_vehicle(vehicle), design.dt, friction=friction, noise=noise)
+    )
 
 
 def _imu(vehicle: Vehicle | None, design: Design) -> Observer:
@@ -113,7 +120,8 @@ def _imu(vehicle: Vehicle | None, design: Design) -> Observer:
 
 
 def _of(vehicle: Vehicle, observer: Observer) -> Observer:
-    return replace(observer, settings={"vehicle": vehicle.name, **observer.settings})
+    straight = without_zero(observer, SteerZero.from_vehicle(vehicle))
+    return replace(straight, settings={"vehicle": vehicle.name, **straight.settings})
 
 
 def on_the_road(observer: Observer) -> Observer:

@@ -107,6 +107,13 @@ _TWO_WHEELER: dict[str, Known] = {
     "rear_relaxation_length": Known("m", 1e-3, 5, False, "sigma_r, over which the rear tyre builds up its force"),
     "steer_damping": Known("N*m*s/rad", 0, 100, False, "K, of a two-wheeler's steering damper"),
     "steer_friction": Known("N*m", 0, 20, False, "T_c, Coulomb friction of a two-wheeler's steer axis; 0"),
+    "steer_zero": Known(
+        "rad",
+        -0.35,
+        0.35,
+        False,
+        "delta_0, what a two-wheeler's steering encoder shows straight ahead (motorcycle.md); 0",
+    ),
     "front_wheel_load": Known("N", 0, 2e4, False, "-Z_f, static load of the front wheel"),
     "front_crown_radius": Known("m", 0, 0.2, False, "rho_f, of the front tyre's round section (Cossalter 2006); 0.05"),
     "rear_crown_radius": Known("m", 0, 0.3, False, "rho_r, of the rear tyre's round section; 0.09"),
