@@ -94,6 +94,8 @@ def textbook(
             R = floors + np.append(var, 0)
             R[[0, 2]] += (noise.tilt * x[[3, 4]]) ** 2 * 2 * ekf.TILT_TIME / dt
             R[4] += (noise.heave * heave(x)) ** 2 * 2 * ekf.HEAVE_TIME / dt
+            if noise.zero:
+                R[5] += (noise.bend * x[1]) ** 2 * 2 * ekf.BEND_TIME / dt
             R = np.diag(R)
             H = bent(rows, x)
             S = H @ P @ H.T + R
