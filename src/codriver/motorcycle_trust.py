@@ -8,10 +8,12 @@ Some estimators of this family have no innovations, and the innovations of the o
 * the yaw rate follows speed times steer angle, by a length of the order of a wheelbase;
 * the pitch rate in bends is -v r^2 / g;
 * v delta = w r + v delta_0, by least squares: delta_0 is the steering encoder's zero, unless the estimator finds it;
-* no sensor shows the same all the time;
+* the accelerometer is level (`motorcycle_mounting.py`);
+* no sensor hangs or is at the end of its range (`motorcycle_still.py`);
+* bends tell biases of roll and yaw rate, and scales (`motorcycle_bends.py`); without them
 * the roll rate adds up to nothing, since nobody rolls over.
 
-Speed or accelerometer that are somewhat wrong do not show here. On rides without bends nothing is judged but gravity.
+On rides without bends nothing is judged but gravity.
 """
 
 from __future__ import annotations
@@ -22,12 +24,18 @@ import numpy as np
 
 from codriver.finding import Finding
 from codriver.models.road_frame import GRAVITY
+from codriver.motorcycle_bends import bend_findings, fit_bends
+from codriver.motorcycle_mounting import mounting_findings
+from codriver.motorcycle_still import still_findings
 from codriver.signals import Grid, Log
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
 
 SPEED = "longitudinal_speed"
-NAMES = (SPEED, "roll_rate", "pitch_rate", "yaw_rate", "steer_angle", "lateral_acceleration", "vertical_acceleration")
+NAMES = (
+    SPEED, "roll_rate", "pitch_rate", "yaw_rate", "steer_angle", "longitudinal_acceleration", "lateral_acceleration",
+    "vertical_acceleration",
+)  # fmt: skip
 DT, BLOCK = 0.02, 25  # s, ticks of a block
 MOVING, LEAST = 2.0, 12  # m/s, blocks
 TURNING, SWAYING, PITCHING = (
@@ -58,15 +66,26 @@ def motorcycle_findings(values: Values, valid: Flags, grid: Grid, log: Log) -> l
     columns = log.sample([name for name in NAMES if name in log], DT).values
     moving = columns[SPEED] > MOVING
     if moving.sum() < LEAST * BLOCK:
-        return []
+        least = LEAST * BLOCK * DT
+        return [
+            Finding(
+                "warn",
+                f"{moving.sum() * DT:.3g} s of riding: too short to tell wrong signs, units, axes or biases ({least:g} s)",
+            )
+        ]
     used = set(grid.values)
+    blocks = {name: _blocks(np.where(moving, column, np.nan)) for name, column in _with_turn(columns).items()}
+    mounted, askew = mounting_findings(columns, moving, DT, BLOCK, used)
+    bends = fit_bends(columns, moving, DT, BLOCK)
     return [
-        *_still({name: column[moving] for name, column in columns.items() if name in used - {SPEED}}),
+        *still_findings({name: log[name] for name in NAMES if name in log}, log[SPEED], MOVING, used),
         *_gravity({name: column[moving] for name, column in columns.items()}, used),
-        *_bends({name: _blocks(np.where(moving, column, np.nan)) for name, column in _with_turn(columns).items()}, used),
-        *_zero({name: _blocks(np.where(moving, column, np.nan)) for name, column in _with_turn(columns).items()}, values, used),
-        *_rolled(columns["roll_rate"][moving], values, valid),
-    ]  # fmt: skip
+        *mounted,
+        *_bends(blocks, used),
+        *_zero(blocks, values, used),
+        *(bend_findings(bends, values, valid, askew) if bends is not None else []),
+        *(_rolled(columns["roll_rate"][moving], values, valid) if bends is None or bends.sway is None else []),
+    ]
 
 
 def _with_turn(columns: Values) -> dict[str, Array]:
@@ -89,18 +108,6 @@ def _blocks(column: Array) -> Array:
 
 def _severity(name: str, used: set[str]) -> str:
     return "bad" if name in used else "warn"
-
-
-def _still(columns: Values) -> list[Finding]:
-    """Sensors that never change while it moves."""
-    findings = []
-    for name, column in columns.items():
-        there = column[np.isfinite(column)]
-        if there.size >= LEAST * BLOCK and np.ptp(there) == 0:
-            findings.append(
-                Finding("bad", f"{name} is {there[0]:.3g} all the time while it moves: a sensor that hangs?")
-            )
-    return findings
 
 
 def _gravity(columns: Values, used: set[str]) -> list[Finding]:
