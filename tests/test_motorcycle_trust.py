@@ -7,6 +7,7 @@ import pytest
 
 import codriver as cd
 from codriver.motorcycle_trust import motorcycle_findings
+from codriver.run import observer_for
 from codriver.simulate.motorcycle import RideSetting, simulate_ride
 from codriver.simulate.motorcycle.files import nominal_vehicle
 
@@ -175,3 +176,28 @@ def test_short_ride_says_that_it_cannot_be_judged(track):
 def test_steer_that_rests_on_a_straight_is_sound(track):
     rests = changed(track, "steer_angle", lambda t, d: np.where(t < 6, 0.0, d))
     assert told(rests, LINEAR) == {}
+
+
+def every(log: cd.Log, count: int, *names: str) -> cd.Log:
+    """Every so many-th sample of some signals."""
+    return log.with_signals(*(cd.Signal(n, log[n].time[::count], log[n].values[::count], log[n].unit) for n in names))
+
+
+def test_speed_once_a_second(track):
+    said = told(every(track, 100, "longitudinal_speed"), LINEAR)
+    assert any("longitudinal_speed comes every 1 s, and a value holds for 0.5 s" in text for text in said)
+    assert told(every(track, 20, "longitudinal_speed"), LINEAR) == {}
+
+
+def test_a_slow_log_runs_at_the_rate_that_the_tyres_need(log, vehicle):
+    slow = every(log, 5, *log)
+    assert observer_for("motorcycle-kalman", slow, vehicle).dt == 0.01
+    assert observer_for("motorcycle-imu", slow, vehicle).dt == 0.05
+    assert observer_for("motorcycle-kalman", slow, vehicle, rate=125).dt == 0.008
+
+
+def test_speed_out_of_range_is_named(log):
+    check = cd.estimate_log("bicycle-kalman", log, cd.load_vehicle("pasma2024")).check()
+    text = next(f.text for f in check.findings if "is valid" in f.text)
+    assert "100% out of range" in text
+    assert "between 1.5 and 12 m/s" in text

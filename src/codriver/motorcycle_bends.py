@@ -7,9 +7,9 @@ Two fits by least squares over blocks of 0.5 s while it moves, phi_m = -asin(v r
     g^2 (1 - g^2 / a_z^2) = c + kappa ((v r)^2 - 2 v^2 r b_r) + n p' + h p^2                b_r bias of the yaw rate
 
 Along z an accelerometer shows all of gravity and turn, whatever the tyres, a_z = g / cos phi and sin phi = v r / g: kappa = 1, and
-v r is 1 / sqrt(kappa) times too large. A bias of the yaw rate makes bends to one side seem harder than those to the other. The pitch rate tells it too, by
-q = -v r^2 / (g cos phi_m), but an IMU askew about x does the same to it; else the mean of both is taken, each by its standard
-error. Errors of two blocks are taken to be one.
+v r is 1 / sqrt(kappa) times too large. A bias of the yaw rate makes bends to one side seem harder than those to the other. The
+pitch rate tells it too, by q = -v r^2 / (g cos phi_m), but an IMU askew about x does the same to it; else the mean of both is
+taken, each by its standard error. Errors of two blocks are taken to be one.
 
 Figures, and what they find on rides with faults: docs/motorcycle.md.
 """
@@ -36,10 +36,7 @@ SURELY, LIKELY, LATELY = 4.0, 3.0, 2.5  # standard errors
 BALANCED, APART, FAR = 1.1, 0.3, 0.45  # k, and how far from it
 LATE = (-0.06, 0.12)  # s; -0.045 to 0.055 on sound rides
 LEFT, LEFT_FAR = 3.0 * DEGREE, 5.0 * DEGREE  # rms of what the lean's fit leaves; up to 1.5 on sound rides
-TURNS, TURNS_FAR = (
-    (0.84, 1.18),
-    (0.69, 1.56),
-)  # kappa; speed times yaw rate 9 % and 20 % too large, 8 and 20 % too small
+TURNS, TURNS_FAR = (0.87, 1.18), (0.69, 1.56)  # kappa: speed times yaw rate 7 and 20 % too large, 8 and 20 % too small
 Values = Mapping[str, Array]
 
 

@@ -27,6 +27,7 @@ from codriver.models.road_frame import GRAVITY
 from codriver.motorcycle_bends import bend_findings, fit_bends
 from codriver.motorcycle_mounting import mounting_findings
 from codriver.motorcycle_still import still_findings
+from codriver.names import VOCABULARY
 from codriver.signals import Grid, Log
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
@@ -78,6 +79,7 @@ def motorcycle_findings(values: Values, valid: Flags, grid: Grid, log: Log) -> l
     mounted, askew = mounting_findings(columns, moving, DT, BLOCK, used)
     bends = fit_bends(columns, moving, DT, BLOCK)
     return [
+        *_seldom(log, used),
         *still_findings({name: log[name] for name in NAMES if name in log}, log[SPEED], MOVING, used),
         *_gravity({name: column[moving] for name, column in columns.items()}, used),
         *mounted,
@@ -86,6 +88,19 @@ def motorcycle_findings(values: Values, valid: Flags, grid: Grid, log: Log) -> l
         *(bend_findings(bends, values, valid, askew) if bends is not None else []),
         *(_rolled(columns["roll_rate"][moving], values, valid) if bends is None or bends.sway is None else []),
     ]
+
+
+def _seldom(log: Log, used: set[str]) -> list[Finding]:
+    """Signals that come so seldom that their last value does not hold until the next."""
+    findings = []
+    for name in NAMES:
+        hold = VOCABULARY[name].hold
+        if name in used and name in log and len(log[name]) > 2 and log[name].rate * hold < 0.95:
+            findings.append(Finding(
+                "warn", f"{name} comes every {1 / log[name].rate:.2g} s, and a value holds for {hold:g} s: between, nothing is "
+                f"valid. Log it at {2 / hold:.2g} Hz or more, or interpolate it before",
+            ))  # fmt: skip
+    return findings
 
 
 def _with_turn(columns: Values) -> dict[str, Array]:
