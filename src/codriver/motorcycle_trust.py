@@ -64,7 +64,7 @@ def motorcycle_findings(values: Values, valid: Flags, grid: Grid, log: Log) -> l
     """
     if "roll_angle" not in values or "roll_rate" not in grid.values or not {SPEED, "roll_rate"} <= set(log):
         return []
-    columns = log.sample([name for name in NAMES if name in log], DT).values
+    columns = _columns(log)
     moving = columns[SPEED] > MOVING
     if moving.sum() < LEAST * BLOCK:
         least = LEAST * BLOCK * DT
@@ -88,6 +88,22 @@ def motorcycle_findings(values: Values, valid: Flags, grid: Grid, log: Log) -> l
         *(bend_findings(bends, values, valid, askew) if bends is not None else []),
         *(_rolled(columns["roll_rate"][moving], values, valid) if bends is None or bends.sway is None else []),
     ]
+
+
+def _columns(log: Log) -> dict[str, Array]:
+    """The signals on one tick; NaN in gaps, which are longer than a value holds, and than one and a half steps of a slow signal."""
+    grid = log.sample([name for name in NAMES if name in log], DT)
+    columns = {}
+    for name, column in grid.values.items():
+        signal = log[name]
+        stamps = signal.time[np.isfinite(signal.values)]
+        if not stamps.size:
+            columns[name] = np.full(column.size, np.nan)
+            continue
+        age = grid.time - stamps[np.maximum(np.searchsorted(stamps, grid.time + DT / 2) - 1, 0)]
+        longest = max(VOCABULARY[name].hold, 1.5 / signal.rate if len(signal) > 1 else 0.0)
+        columns[name] = np.where(np.abs(age) <= longest, column, np.nan)
+    return columns
 
 
 def _seldom(log: Log, used: set[str]) -> list[Finding]:
