@@ -107,10 +107,9 @@ def _spikes(name: str, values: Array, going: Flags) -> list[Finding]:
     """Samples that stand out from their neighbours; of the speed the reader tells."""
     out = np.where(going[1:-1], values[1:-1] - 0.5 * (values[:-2] + values[2:]), 0.0)
     usual = 1.4826 * float(np.median(np.abs(out[going[1:-1]])))
-    # A spike is half as far from its neighbours' means, on the other side.
-    spikes = (np.abs(out) > SPIKE * usual) & (
-        np.abs(out) > 1.5 * np.maximum(np.abs(np.roll(out, 1)), np.abs(np.roll(out, -1)))
-    )
+    # A spike is half as far from its neighbours' means, on the other side; a coarse sensor's steps are no spikes.
+    least = max(SPIKE * usual, float(values[going].std()))
+    spikes = (np.abs(out) > least) & (np.abs(out) > 1.5 * np.maximum(np.abs(np.roll(out, 1)), np.abs(np.roll(out, -1))))
     count = int(spikes.sum())
     if usual == 0 or not 3 <= count < 0.05 * values.size:
         return []
