@@ -389,3 +389,12 @@ class TestFiles:
 
     def test_all_scenarios_are_named(self):
         assert set(SCENARIOS) == {"track", "slalom", "double-lane-change"}
+
+
+@pytest.mark.parametrize(("setting", "said"), [
+    ({"noise": -0.05}, "noise of -5 %"), ({"bank": 0.5}, "banks by 28.6 degrees"), ({"speed_error": -1.5}, "speed error of -150 %"),
+    ({"bias": 1e6}, "biases 1e"), ({"counts": -1}, "-1 counts"),
+])  # fmt: skip
+def test_impossible_settings_are_refused_in_the_units_of_the_command(setting, said):
+    with pytest.raises(UsageError, match=said):
+        RideSetting("slalom", **setting)

@@ -367,3 +367,17 @@ def test_absurd_values_are_missing():
     signal, notes = drop_codes(cd.Signal("longitudinal_speed", np.arange(6000) / 100, values, "m/s"))
     assert np.isnan(signal.values).sum() == 2
     assert "2 values of up to 1e+30 m/s" in notes[0]
+
+
+def test_a_gap_is_no_stuck_sensor():
+    t = np.arange(0, 60, 0.01)
+    values = np.sin(t)
+    there = (t < 20) | (t > 40)
+    said = find_faults(cd.Signal("roll_rate", t[there], values[there], "rad/s"))
+    assert len(said) == 1
+    assert "1 gap, the longest 20 s" in said[0]
+    values[2000:4000] = 0.1
+    assert any(
+        "shows one value for 20 s from 20.00 s" in text
+        for text in find_faults(cd.Signal("roll_rate", t, values, "rad/s"))
+    )

@@ -8,10 +8,12 @@ Some estimators of this family have no innovations, and the innovations of the o
 * the yaw rate follows speed times steer angle, by a length of the order of a wheelbase;
 * the pitch rate in bends is -v r^2 / g;
 * v delta = w r + v delta_0, by least squares: delta_0 is the steering encoder's zero, unless the estimator finds it;
-* no sensor shows the same all the time;
+* the accelerometer is level (`motorcycle_mounting.py`);
+* no sensor hangs or is at the end of its range (`motorcycle_still.py`);
+* bends tell biases of roll and yaw rate, and scales (`motorcycle_bends.py`); without them
 * the roll rate adds up to nothing, since nobody rolls over.
 
-Speed or accelerometer that are somewhat wrong do not show here. On rides without bends nothing is judged but gravity.
+On rides without bends nothing is judged but gravity.
 """
 
 from __future__ import annotations
@@ -22,12 +24,19 @@ import numpy as np
 
 from codriver.finding import Finding
 from codriver.models.road_frame import GRAVITY
+from codriver.motorcycle_bends import bend_findings, fit_bends
+from codriver.motorcycle_mounting import mounting_findings
+from codriver.motorcycle_still import still_findings
+from codriver.names import VOCABULARY
 from codriver.signals import Grid, Log
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
 
 SPEED = "longitudinal_speed"
-NAMES = (SPEED, "roll_rate", "pitch_rate", "yaw_rate", "steer_angle", "lateral_acceleration", "vertical_acceleration")
+NAMES = (
+    SPEED, "roll_rate", "pitch_rate", "yaw_rate", "steer_angle", "longitudinal_acceleration", "lateral_acceleration",
+    "vertical_acceleration",
+)  # fmt: skip
 DT, BLOCK = 0.02, 25  # s, ticks of a block
 MOVING, LEAST = 2.0, 12  # m/s, blocks
 TURNING, SWAYING, PITCHING = (
@@ -56,18 +65,59 @@ def motorcycle_findings(values: Values, valid: Flags, grid: Grid, log: Log) -> l
     """
     if "roll_angle" not in values or "roll_rate" not in grid.values or not {SPEED, "roll_rate"} <= set(log):
         return []
-    columns = log.sample([name for name in NAMES if name in log], DT).values
+    columns = _columns(log)
     moving = columns[SPEED] > MOVING
     if moving.sum() < LEAST * BLOCK:
-        return []
+        least = LEAST * BLOCK * DT
+        return [
+            Finding(
+                "warn",
+                f"{moving.sum() * DT:.3g} s of riding: too short to tell wrong signs, units, axes or biases ({least:g} s)",
+            )
+        ]
     used = set(grid.values)
+    blocks = {name: _blocks(np.where(moving, column, np.nan)) for name, column in _with_turn(columns).items()}
+    mounted, askew = mounting_findings(columns, moving, DT, BLOCK, used)
+    bends = fit_bends(columns, moving, DT, BLOCK)
     return [
-        *_still({name: column[moving] for name, column in columns.items() if name in used - {SPEED}}),
+        *_seldom(log, used),
+        *still_findings({name: log[name] for name in NAMES if name in log}, log[SPEED], MOVING, used),
         *_gravity({name: column[moving] for name, column in columns.items()}, used),
-        *_bends({name: _blocks(np.where(moving, column, np.nan)) for name, column in _with_turn(columns).items()}, used),
-        *_zero({name: _blocks(np.where(moving, column, np.nan)) for name, column in _with_turn(columns).items()}, values, used),
-        *_rolled(columns["roll_rate"][moving], values, valid),
-    ]  # fmt: skip
+        *mounted,
+        *_bends(blocks, used),
+        *_zero(blocks, values, used),
+        *(bend_findings(bends, values, valid, askew) if bends is not None else []),
+        *(_rolled(columns["roll_rate"][moving], values, valid) if bends is None or bends.sway is None else []),
+    ]
+
+
+def _columns(log: Log) -> dict[str, Array]:
+    """The signals on one tick; NaN in gaps, which are longer than a value holds, and than one and a half steps of a slow signal."""
+    grid = log.sample([name for name in NAMES if name in log], DT)
+    columns = {}
+    for name, column in grid.values.items():
+        signal = log[name]
+        stamps = signal.time[np.isfinite(signal.values)]
+        if not stamps.size:
+            columns[name] = np.full(column.size, np.nan)
+            continue
+        age = grid.time - stamps[np.maximum(np.searchsorted(stamps, grid.time + DT / 2) - 1, 0)]
+        longest = max(VOCABULARY[name].hold, 1.5 / signal.rate if len(signal) > 1 else 0.0)
+        columns[name] = np.where(np.abs(age) <= longest, column, np.nan)
+    return columns
+
+
+def _seldom(log: Log, used: set[str]) -> list[Finding]:
+    """Signals that come so seldom that their last value does not hold until the next."""
+    findings = []
+    for name in NAMES:
+        hold = VOCABULARY[name].hold
+        if name in used and name in log and len(log[name]) > 2 and log[name].rate * hold < 0.95:
+            findings.append(Finding(
+                "warn", f"{name} comes every {1 / log[name].rate:.2g} s, and a value holds for {hold:g} s: between, nothing is "
+                f"valid. Log it at {2 / hold:.2g} Hz or more, or interpolate it before",
+            ))  # fmt: skip
+    return findings
 
 
 def _with_turn(columns: Values) -> dict[str, Array]:
@@ -90,18 +140,6 @@ def _blocks(column: Array) -> Array:
 
 def _severity(name: str, used: set[str]) -> str:
     return "bad" if name in used else "warn"
-
-
-def _still(columns: Values) -> list[Finding]:
-    """Sensors that never change while it moves."""
-    findings = []
-    for name, column in columns.items():
-        there = column[np.isfinite(column)]
-        if there.size >= LEAST * BLOCK and np.ptp(there) == 0:
-            findings.append(
-                Finding("bad", f"{name} is {there[0]:.3g} all the time while it moves: a sensor that hangs?")
-            )
-    return findings
 
 
 def _gravity(columns: Values, used: set[str]) -> list[Finding]:

@@ -74,7 +74,8 @@ def estimate_log(
         log: the signals.
         vehicle: its parameters, where the estimator needs some.
         ell, preset, form: as for `build`; without a preset, estimators of the driver's torque fit their noise to the log.
-        rate: ticks per second; None takes that of the quickest measurement (`suggest_rate`).
+        rate: ticks per second; None takes that of the quickest measurement (`suggest_rate`), or more where the estimator's model
+            needs it (`Estimator.least`).
 
     Raises:
         UsageError: an option that cannot be.
@@ -99,7 +100,7 @@ def observer_for(
     """
     probe = build(name, vehicle, ell=ell, preset=preset, form=form)
     if rate is None:
-        rate = suggest_rate(log, probe.measured or probe.required)
+        rate = max(suggest_rate(log, probe.measured or probe.required), get_estimator(name).least)
     if preset is None and get_estimator(name).learns:
         assert vehicle is not None  # else there would be no probe
         refuse_missing(probe, log)

@@ -47,6 +47,7 @@ FEW = 50  # innovations; fewer say nothing
 _LIKELY = dict.fromkeys(("acceleration", "speed"), "slip, a wrong ratio, or a sensor fault")
 # Known input over accelerometer, rms: a quarter to a third in the drives we have.
 POWERFUL = 1.5
+RANGES = ("speed_in_range", "certified")  # flags that are 1 where the speed is one that the observer was made for
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,10 @@ def check_estimate(
     judged = "valid" in values or all(output.name != "valid" for output in outputs)
     valid = values["valid"] > 0.5 if "valid" in values else np.full(len(grid), judged)
     if judged:
-        findings = [_validity(values, valid, grid), *_rows(values, outputs, measured, valid, grid, ell, nis, lean)]
+        findings = [
+            _validity(values, outputs, valid, grid),
+            *_rows(values, outputs, measured, valid, grid, ell, nis, lean),
+        ]
     else:
         findings = [Finding("warn", "cannot be judged: the flag 'valid' is not among the outputs; compile with it")]
     if not measured:
@@ -164,7 +168,9 @@ def _driver(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Gri
     return findings
 
 
-def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: Grid) -> Finding:
+def _validity(
+    values: Mapping[str, Array], outputs: Sequence[Output], valid: npt.NDArray[np.bool_], grid: Grid
+) -> Finding:
     """How much of the drive is valid, and why the rest is not."""
     if not valid.size:
         return Finding("bad", "there is not one tick: the signals do not overlap, or the log is empty")
@@ -178,6 +184,13 @@ def _validity(values: Mapping[str, Array], valid: npt.NDArray[np.bool_], grid: G
             rest = ~valid & (values["standstill"] < 0.5) & (values["inputs_known"] > 0.5)
             if rest.mean() > 0.05:
                 reasons.append(f"slower than 1 m/s, before the first speed or not settled {rest.mean():.0%}")
+    for output in outputs:
+        if (
+            output.name in RANGES
+            and output.name in values
+            and (beyond := float(np.mean(values[output.name] < 0.5))) > 0.05
+        ):
+            reasons.append(f"{beyond:.0%} out of range or without a speed; {output.name} is {output.meaning}")
     text = f"{share:.0%} of {len(grid) * grid.dt:.1f} s is valid" + (f" ({', '.join(reasons)})" if reasons else "")
     return Finding("bad" if share < 0.05 else "warn" if share < 0.5 else "ok", text, _spans(~valid, grid))
 

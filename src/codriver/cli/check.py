@@ -33,8 +33,9 @@ def vehicle(
     from rich.markup import escape
     from rich.table import Table
 
-    from codriver.cli.terminal import console
+    from codriver.cli.terminal import console, say_findings, some
     from codriver.observers import ESTIMATORS
+    from codriver.observers.motorcycle_vehicle import motorcycle_vehicle_findings
     from codriver.vehicles import load_vehicle
     from codriver.vehicles.load import KNOWN
 
@@ -52,8 +53,12 @@ def vehicle(
         lacking = [p for p in estimator.parameters if p not in car]
         out.print(
             f"  {'[red]no[/] ' if lacking else '[green]yes[/]'} {estimator.name:<14}"
-            + (f" lacks {', '.join(lacking)}" if lacking else "")
+            + (f" lacks {some(lacking)}" if lacking else "")
         )
+    found = motorcycle_vehicle_findings(car, {})
+    if found:
+        out.print()
+        say_findings(out, ({"severity": f.severity, "text": f.text} for f in found))
     if log is not None:
         _against(car, log, dbc, names, bus)
 

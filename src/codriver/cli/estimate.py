@@ -176,6 +176,7 @@ def check_with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> C
     from codriver.measured_torque import sensor_findings
     from codriver.observers.column import wheel_findings
     from codriver.observers.gears import unknown_gears
+    from codriver.observers.motorcycle_vehicle import motorcycle_vehicle_findings
 
     said = {f.text for f in check.findings}
     found = [f for f in check_vehicle_against_log(log, vehicle) if f.severity != "ok" and f.text not in said]
@@ -184,6 +185,7 @@ def check_with_vehicle(result: Estimate, log: Log, vehicle: Vehicle | None) -> C
         [
             *(replace(f, text=f"vehicle file: {f.text}") for f in found),
             *(unknown_gears(log, vehicle) if "gear" in result.grid.values else []),
+            *(motorcycle_vehicle_findings(vehicle, result.provenance) if "roll_angle" in result else []),
             *(wheel_findings(vehicle, result.provenance) if "column_torque" in result else []),
             *sensor_findings(result),
             *check.findings,

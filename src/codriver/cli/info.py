@@ -132,7 +132,7 @@ def _show(summary: dict[str, Any]) -> None:
 
 def _show_family(family: str, members: list[dict[str, Any]], summary: dict[str, Any]) -> None:
     """The estimators of a family, a line each; one line for all where the log has the signals of none, and of another's."""
-    from codriver.cli.terminal import console
+    from codriver.cli.terminal import console, some
 
     out = console()
     # Where nothing is mapped yet, the first family is told in full.
@@ -151,9 +151,7 @@ def _show_family(family: str, members: list[dict[str, Any]], summary: dict[str, 
         lacks = [f"signals: {', '.join(e['missing_signals'])}"] if e["missing_signals"] else []
         if e["missing_parameters"]:
             given = summary["vehicle"] is not None
-            lacks.append(
-                f"vehicle parameters: {', '.join(e['missing_parameters'])}" if given else "a vehicle (--vehicle)"
-            )
+            lacks.append(f"vehicle parameters: {some(e['missing_parameters'])}" if given else "a vehicle (--vehicle)")
         mark = "[yellow]part[/]" if e["signals_there"] else "[red]no[/]  "
         out.print(f"  {mark} {e['name']:<21} lacks {'; '.join(lacks)}")
 
@@ -168,7 +166,8 @@ def _show_best(summary: dict[str, Any]) -> None:
         with_vehicle = summary["best_with_a_vehicle"][family]
         if choice is None and with_vehicle is None:
             continue
-        more = f"with a vehicle file, {with_vehicle}" if with_vehicle != choice else ""
+        file = "another kind of vehicle" if summary["vehicle"] is not None else "a vehicle file"
+        more = f"with {file}, {with_vehicle}" if with_vehicle != choice else ""
         text = "; ".join(part for part in (f"[bold]{choice}[/]" if choice else "", more) if part)
         out.print(("" if told else "\n") + f"best available for {family}: {text}")
         told = True

@@ -19,7 +19,8 @@ VehicleName = Annotated[
     str | None,
     typer.Option(
         "--vehicle",
-        help="Built-in name (bisoffi2017, bisoffi2015, renault-zoe, okamoto2019, okamoto2019-simulator) or TOML file.",
+        help="Built-in name or TOML file. Cars: bisoffi2017, bisoffi2015, renault-zoe; steering wheels: okamoto2019, "
+        "okamoto2019-simulator; two-wheelers: sharp1971, meijaard2007, pasma2024, moore2012.",
         show_default=False,
     ),
 ]
@@ -60,6 +61,7 @@ def check_inputs(log: Path, dbc: Path | None, names: Path | None) -> None:
         UsageError: one is not; the message says which.
     """
     from codriver.errors import UsageError
+    from codriver.vehicles import built_in_vehicles
 
     for path, what, option in (
         (log, "a recording", "LOG"),
@@ -67,4 +69,7 @@ def check_inputs(log: Path, dbc: Path | None, names: Path | None) -> None:
         (names, "a names file", "--names"),
     ):
         if path is not None and not path.exists():
-            raise UsageError(f"{option} {path} does not exist", what, "check the path")
+            do = "check the path"
+            if str(path) in built_in_vehicles():
+                do = f"{path} is a built-in vehicle: give it by --vehicle; `codriver check vehicle {path}` shows it"
+            raise UsageError(f"{option} {path} does not exist", what, do)

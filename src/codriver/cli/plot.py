@@ -20,7 +20,9 @@ app = typer.Typer(help="Plot what a vehicle is like.", no_args_is_help=True, ric
 Machine = Annotated[
     str,
     typer.Argument(
-        metavar="VEHICLE", help="A two-wheeler: sharp1971, meijaard2007, pasma2024 or a TOML file.", show_default=False
+        metavar="VEHICLE",
+        help="A two-wheeler: sharp1971, meijaard2007, pasma2024, moore2012 or a TOML file.",
+        show_default=False,
     ),
 ]
 Out = Annotated[

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 # Of an estimate's settings, those that are told, in this order.
 SETTINGS = ("vehicle", "known_torque", "ell", "preset", "order", "balance", "form", "smoother")
+MANY = 5  # parameters of a vehicle that are named one by one
 _STYLE = {"ok": "green", "warn": "yellow", "bad": "red"}
 
 
@@ -97,3 +98,10 @@ def _short(text: str) -> str:
     except ValueError:
         return text
     return text if len(text) <= 5 else f"{number:.4g}"
+
+
+def some(parameters: Sequence[str]) -> str:
+    """Parameters that a vehicle lacks; those of another kind of vehicle are counted."""
+    if len(parameters) <= MANY:
+        return ", ".join(parameters)
+    return f"{', '.join(parameters[:3])} and {len(parameters) - 3} more: another kind of vehicle?"

@@ -139,9 +139,10 @@ def find_faults(signal: Signal) -> list[str]:
                 f"{name}: {counted(long.size, 'gap')}, the longest {steps[long].max():.3g} s at {where:.2f} s"
             )
     if signal.name in _ANALOGUE and len(signal) > 2:
+        # A stretch ends a tick after its last sample: a gap after it is told as a gap.
         change = np.flatnonzero(np.diff(signal.values) != 0)
-        edges = np.concatenate([[signal.time[0]], signal.time[change + 1], [signal.time[-1]]])
-        longest = np.diff(edges)
+        edges = signal.time[np.concatenate([[0], change + 1])]
+        longest = signal.time[np.concatenate([change, [len(signal) - 1]])] - edges + 1 / signal.rate
         if longest.max() > STUCK_SECONDS:
             where = float(edges[np.argmax(longest)])
             sentences.append(f"{name}: shows one value for {longest.max():.3g} s from {where:.2f} s on; stuck sensor?")

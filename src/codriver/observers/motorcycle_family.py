@@ -48,7 +48,9 @@ PARAMETERS = tuple(LETTERS.values())
 BALANCED = ("steer_angle", "roll_rate", "yaw_rate", "longitudinal_speed")
 CHAINED = ("longitudinal_speed", "yaw_rate", "steer_angle", "roll_rate")  # the same, as the parts of a chain want them
 RANGE = (8.0, 45.0)  # m/s, of the observers by LMI and of the unknown input
-RATE = 100.0  # Hz, at which errors of the balanced turn are independent, however often it is sampled
+RATE = (
+    100.0  # Hz, at which errors of the balanced turn are independent, however often it is sampled; and that tyres need
+)
 WINDOW = 0.04  # s, of the differentiator in front of them
 # Of the design by LMI: a = v W errs by all that is out of balance, far more than a gyroscope does; with less trust in it and slow
 # poles the roll comes from the rates. The tyres' own poles v / sigma bound the disc from below: the narrowest that can be is taken.
@@ -155,20 +157,22 @@ def on_the_road(observer: Observer) -> Observer:
 register(Estimator(
     "motorcycle-ekf", PARAMETERS, NEEDED,
     "roll, tyre forces and rider's torque at any lean, from the IMU's raw signals, steer angle and speed; finds biases", FAMILY,
-    _ekf, forms=("kalman",), varies=False,
+    _ekf, forms=("kalman",), least=RATE, varies=False,
 ))  # fmt: skip
 register(Estimator(
     "motorcycle-kalman", PARAMETERS, BALANCED,
     "roll, tyre forces and rider's torque on the linear model, from steer angle, gyroscope and speed", FAMILY, _kalman,
-    varies=False,
+    least=RATE, varies=False,
 ))  # fmt: skip
 register(Estimator(
     "motorcycle-ts", PARAMETERS, CHAINED,
-    "roll, tyre forces and rider's torque by the 2018 paper's observer, no bands", FAMILY, _ts, forms=("kalman",), varies=False,
+    "roll, tyre forces and rider's torque by the 2018 paper's observer, no bands", FAMILY, _ts, forms=("kalman",), least=RATE,
+    varies=False,
 ))  # fmt: skip
 register(Estimator(
     "motorcycle-uio", PARAMETERS, CHAINED,
-    "roll, tyre forces and rider's torque by an unknown-input observer, no bands", FAMILY, _uio, forms=("kalman",), varies=False,
+    "roll, tyre forces and rider's torque by an unknown-input observer, no bands", FAMILY, _uio, forms=("kalman",), least=RATE,
+    varies=False,
 ))  # fmt: skip
 register(Estimator(
     "bicycle-kalman", tuple(BICYCLE_LETTERS.values()), (*BICYCLE_NEEDED, "longitudinal_speed"),

@@ -60,6 +60,7 @@ class Estimator:
         learns: whether its noise is fitted to the record where no preset is given.
         forms: the forms it has.
         forbids: parameters of a vehicle that it is not for.
+        least: Hz, at which it runs at least where no rate is told; a slower log's samples are used on the ticks they come on.
         varies: whether the vehicle may change which signals it needs; where not, nothing is built to find out.
     """
 
@@ -76,6 +77,7 @@ class Estimator:
     learns: bool = False
     forms: tuple[str, ...] = ("kalman", "constant")
     forbids: tuple[str, ...] = ()
+    least: float = 0.0
     varies: bool = True
 
 

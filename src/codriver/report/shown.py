@@ -20,12 +20,12 @@ def shown(name: str, values: npt.ArrayLike, unit: str | None = None) -> Array:
     """Values of a quantity in its display unit.
 
     Args:
-        name: standard name; values of other names are shown as they are.
+        name: standard name, or one of its bias; values of other names are shown as they are.
         values: in `unit`.
         unit: by default the vocabulary's SI unit.
     """
     numbers = np.asarray(values, dtype=float)
-    entry = VOCABULARY.get(name)
+    entry = VOCABULARY.get(name.removesuffix("_bias"))
     if entry is None:
         return numbers
     if name == "road_slope":
@@ -36,7 +36,7 @@ def shown(name: str, values: npt.ArrayLike, unit: str | None = None) -> Array:
 
 def shown_unit(name: str, unit: str = "") -> str:
     """The display unit of a quantity as print has it ("m/s³"); `unit` where the name is no standard name."""
-    entry = VOCABULARY.get(name)
+    entry = VOCABULARY.get(name.removesuffix("_bias"))
     text = entry.display if entry else unit
     return _PRETTY.get(text, text)
 

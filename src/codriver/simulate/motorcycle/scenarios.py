@@ -123,21 +123,33 @@ class RideSetting:
             raise UsageError(f"scenario '{self.scenario}'", f"one of {', '.join(SCENARIOS)}", "choose one of these")
         if self.rate < 10 or round(1 / TICK) % self.rate:
             raise UsageError(f"a rate of {self.rate} Hz", "10, 20, 50, 100, 200, 500, 1000, ...", "choose one of these")
-        if not 0 <= self.noise <= 1 or not abs(self.bank) <= 0.2 or not abs(self.speed_error) <= 0.2 or self.counts < 0:
-            raise UsageError(
-                f"noise {self.noise:g}, bank {self.bank:g} rad, speed error {self.speed_error:g}, {self.counts} counts",
-                "noise 0 to 1, bank to 0.2 rad either way, speed error to 0.2 either way, counts of 0 or more",
-                "change the setting",
-            )
-        if not abs(self.zero) <= 0.2:
-            raise UsageError(
-                f"an encoder's zero {self.zero:g} rad off", "0.2 rad either way at most", "change the setting"
-            )
-        if not all(low <= at <= high for at, (low, high) in zip(self.imu, _IMU, strict=True)):
-            raise UsageError(
+        for wrong, found, expected in (
+            (not 0 <= self.noise <= 1, f"noise of {100 * self.noise:g} %", "0 to 100 %"),
+            (
+                not abs(self.bank) <= 0.2,
+                f"a road that banks by {self.bank * 180 / pi:.3g} degrees",
+                "11 degrees at most either way",
+            ),
+            (
+                not abs(self.speed_error) <= 0.2,
+                f"a speed error of {100 * self.speed_error:g} %",
+                "20 % at most either way",
+            ),
+            (not abs(self.bias) <= 20, f"biases {self.bias:g} times the usual", "20 times at most either way"),
+            (self.counts < 0, f"an encoder of {self.counts} counts", "0 or more"),
+            (
+                not abs(self.zero) <= 0.2,
+                f"an encoder {self.zero * 180 / pi:.3g} degrees off its zero",
+                "11 degrees at most either way",
+            ),
+            (
+                not all(low <= at <= high for at, (low, high) in zip(self.imu, _IMU, strict=True)),
                 f"an IMU at {', '.join(f'{at:g}' for at in self.imu)} m",
-                f"forward, left, up within {', '.join(f'{low:g} to {high:g}' for low, high in _IMU)} m", "change the setting",
-            )  # fmt: skip
+                f"forward, left, up within {', '.join(f'{low:g} to {high:g}' for low, high in _IMU)} m",
+            ),
+        ):
+            if wrong:
+                raise UsageError(found, expected, "choose one of these")
         if self.seconds is not None and not self.seconds > 0:
             raise UsageError(f"a ride of {self.seconds:g} s", "more than 0 s", "choose such")
 
