@@ -147,7 +147,7 @@ def faults() -> dict[str, Fault]:
 
 
 def main() -> None:
-    """The table of docs/motorcycle.md."""
+    """Print how many faults cost, and how many of them are told."""
     vehicle, programs, made = nominal_vehicle(), {}, {"sound": lambda log: log, **faults()}
     counts: Counter[tuple[str, str]] = Counter()
     missed = []
