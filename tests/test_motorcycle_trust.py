@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import codriver as cd
-from codriver.motorcycle_trust import motorcycle_findings
 from codriver.run import observer_for
 from codriver.simulate.motorcycle import RideSetting, simulate_ride
 from codriver.simulate.motorcycle.files import nominal_vehicle
+from codriver.trust.motorcycle import motorcycle_findings
 
 DEGREE = np.pi / 180
 

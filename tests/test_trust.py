@@ -7,6 +7,7 @@ import codriver as cd
 from codriver.errors import MissingSignal
 from codriver.observers import Output
 from codriver.simulate import demo_drive, truth_log
+from codriver.trust.rows import row_findings
 from conftest import motion_log
 from toy_wheel import OUTPUTS, toy_wheel, wheel_log
 
@@ -97,6 +98,22 @@ class TestForeignObserver:
         assert "angle: the innovations scatter" in found(check, "bad")
         assert "ell" not in found(check, "bad")  # it has no such knob
         assert "slip" not in found(check, "warn")
+
+    @pytest.mark.parametrize(("times", "severity"), [(1, "ok"), (4, "warn"), (12, "bad")])
+    def test_what_a_model_takes_for_granted_is_bad_beyond_eight_bands(self, times, severity):
+        """Balance in a turn is no sensor's: four times the band, which is bad of an encoder, is a warning."""
+        white = times * np.random.default_rng(0).standard_normal(5000)
+        grid = wheel_log().sample(("steering_wheel_angle",), 0.01)
+        n = len(grid)
+        for row, worst in (("balance", severity), ("angle", "ok" if times == 1 else "bad")):
+            values = {f"{row}_innovation": white[:n], f"{row}_innovation_sd": np.ones(n), "valid": np.ones(n)}
+            outputs = (
+                Output(f"{row}_innovation", "m/s^2", "innovation"), Output(f"{row}_innovation_sd", "m/s^2", "innovation_sd"),
+                Output("valid", "1", "flag"),
+            )  # fmt: skip
+            said = row_findings(values, outputs, ("angle",), values["valid"] > 0.5, grid, None, {}, {})
+            assert [f.severity for f in said if "lean" in f.text] == [worst], row
+            assert any("taken for granted" in f.text for f in said) == (row == "balance" and times > 1)
 
     def test_much_too_wide_a_band_is_no_praise(self):
         check = cd.compile(toy_wheel(innovation_sd=1.0)).run(wheel_log()).check()

@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from codriver.errors import MissingSignal
-from codriver.innovations import Innovations, innovation_rows
 from codriver.observers.observer import Output
 from codriver.signals import Grid, Log, Signal
 from codriver.signals.signal import Array
 from codriver.trust import Check, check_estimate
+from codriver.trust.innovations import Innovations, innovation_rows
 
 
 @dataclass(frozen=True, eq=False)

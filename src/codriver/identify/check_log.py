@@ -27,10 +27,10 @@ from codriver.identify.pedal import SIGNALS as PEDAL_SIGNALS
 from codriver.identify.pedal import pedal_rows
 from codriver.identify.regression import solve, trimmed_rows
 from codriver.identify.standard_errors import newey_west
-from codriver.sensors_agree import sensors_agree
 from codriver.signals import Log
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
+from codriver.trust.sensors_agree import sensors_agree
 from codriver.vehicles import Vehicle
 
 DT = 0.02  # s; for factors, not for per cents

@@ -27,10 +27,10 @@ from codriver.identify.plausible import far_from_old, within_file_bounds
 from codriver.identify.regression import regress, rms, solve
 from codriver.identify.sound import refuse_unsound
 from codriver.identify.usable import AFTER_SHIFT, BEFORE_SHIFT, OPEN_CLUTCH, filled, inside, widened
-from codriver.sensors_agree import sensors_agree
 from codriver.signals import Grid, Log
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
+from codriver.trust.sensors_agree import sensors_agree
 from codriver.vehicles import Vehicle
 
 SIGNALS = ("accelerator_pedal", "engine_torque_request")

@@ -4,7 +4,7 @@ Least squares finds numbers in any signals. What no fit can show afterwards is l
 
 * too few samples, or too few a second: the low-pass of 5 Hz needs 5 a second or more, 10 are better;
 * a signal that is the same all the time;
-* an accelerometer that does not follow the change of speed: wrong unit, wrong sign, stuck (`codriver.sensors_agree`).
+* an accelerometer that does not follow the change of speed: wrong unit, wrong sign, stuck (`codriver.trust.sensors_agree`).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from codriver.errors import LogError
 from codriver.finding import Finding
 from codriver.identify.brake_rows import short_name
 from codriver.names import VOCABULARY
-from codriver.sensors_agree import pedals_move, sensors_agree
 from codriver.signals import Log
+from codriver.trust.sensors_agree import pedals_move, sensors_agree
 
 LEAST_RATE, GOOD_RATE = 5.0, 10.0  # Hz
 LEAST_SAMPLES = 3

@@ -24,13 +24,13 @@ import numpy as np
 
 from codriver.finding import Finding
 from codriver.models.road_frame import GRAVITY
-from codriver.motorcycle_bends import bend_findings, fit_bends
-from codriver.motorcycle_mounting import mounting_findings
-from codriver.motorcycle_still import still_findings
 from codriver.names import VOCABULARY
 from codriver.signals import Grid, Log
 from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
+from codriver.trust.motorcycle_bends import bend_findings, fit_bends
+from codriver.trust.motorcycle_mounting import mounting_findings
+from codriver.trust.motorcycle_still import still_findings
 
 SPEED = "longitudinal_speed"
 NAMES = (
