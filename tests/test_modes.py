@@ -57,17 +57,14 @@ class TestBicycle:
         assert bicycle.of("capsize")[k, 0].real == pytest.approx(-0.32286642900409, abs=1e-8)
         assert np.sort(bicycle.of("weave")[0].real) == pytest.approx([3.13164324790656, 5.53094371765393])
 
-    @pytest.mark.slow
     def test_the_package_bicycleparameters(self):
         """Eigenvalues of its own benchmark file by its own code."""
-        package = pytest.importorskip("bicycleparameters")
         from bicycleparameters.models import Meijaard2007Model
         from bicycleparameters.parameter_sets import Meijaard2007ParameterSet
 
         letters = {"IBzz": 2.8, "IHzz": 0.00708, "IByy": 11.0, "IHyy": 0.06}
         own = {k: float(v) for k, v in vars(BENCHMARK).items()} | letters
         theirs = Meijaard2007Model(Meijaard2007ParameterSet({**own, "v": 1.0}, True))
-        assert package is not None
         ours = bicycle_lpv(bicycle_matrices(BicycleParameters.from_vehicle(cd.load_vehicle("meijaard2007"))))
         for v in (0.5, 3.0, 7.0):
             values, _ = theirs.calc_eigen(v=v)
