@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,12 @@ LONG = (
     "test_paper_drivers2019", "test_drivers_errata", "test_style", "test_identify", "test_tune", "test_paper_motorcycle2018",
     "test_style_of_driving", "test_motorcycle_trust", "test_export", "test_elementary", "test_learned_models", "test_mixtures",
 )  # fmt: skip
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """One thread a worker: threads of linear algebra in each of them would spin while they wait for a core."""
+    if getattr(config.option, "numprocesses", None):
+        os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
