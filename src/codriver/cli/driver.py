@@ -70,14 +70,14 @@ def fit(
     Example: codriver driver fit monday.csv tuesday.csv --names names.toml --model hmm-gmr -o anna.driver --report anna.html
     """
     from codriver.cli.driver_words import driver_told, say_driver
-    from codriver.cli.identify import _check_outputs
+    from codriver.cli.identify import check_outputs
     from codriver.cli.terminal import command_line, working
     from codriver.drivers.learned.driver_file import SUFFIX, load_driver, save_driver
     from codriver.drivers.learned.kinds import class_of
     from codriver.drivers.learned.learned_driver import fit_driver
 
     class_of(model)
-    _check_outputs(out, report, [*drives, *(p for p in (dbc, names) if p is not None)], overwrite, SUFFIX)
+    check_outputs(out, report, [*drives, *(p for p in (dbc, names) if p is not None)], overwrite, SUFFIX)
     if out.exists():
         load_driver(out)  # raises: only a driver file may be replaced
     chosen, parameters = with_signals(protocol_of(protocol, horizon), signals), parse_options(options or [])

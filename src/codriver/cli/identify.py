@@ -177,7 +177,7 @@ def _run(
 
     for path in paths:
         check_inputs(path, dbc, names)
-    _check_outputs(out, report, [*paths, *(p for p in (dbc, names) if p is not None)], overwrite)
+    check_outputs(out, report, [*paths, *(p for p in (dbc, names) if p is not None)], overwrite)
     old = load_vehicle(vehicle)
     with working(not as_json, 2) as stage:
         stage("reading " + ", ".join(path.name for path in paths))
@@ -210,7 +210,7 @@ def _run(
         _say(told)
 
 
-def _check_outputs(
+def check_outputs(
     out: Path, report: Path | None, inputs: Sequence[Path], overwrite: bool, suffix: str = ".toml"
 ) -> None:
     """Whether vehicle or driver, whose name ends in `suffix`, and report can be written, asked before the long work.

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from codriver.cli.identify import Logs, Out, Overwrite, Report, _check_outputs, _finite
+from codriver.cli.identify import Logs, Out, Overwrite, Report, _finite, check_outputs
 from codriver.cli.identify_steering import Old, _say, _write, app
 from codriver.cli.options import Bus, Dbc, Json, Names
 
@@ -41,7 +41,7 @@ def alignment(
 
     for path in logs:
         check_inputs(path, dbc, names)
-    _check_outputs(out, report, [*logs, *(p for p in (dbc, names) if p is not None)], overwrite)
+    check_outputs(out, report, [*logs, *(p for p in (dbc, names) if p is not None)], overwrite)
     old = load_vehicle(vehicle) if vehicle is not None else None
     with working(not json, 2) as stage:
         stage("reading " + ", ".join(path.name for path in logs))
@@ -97,7 +97,7 @@ def alignment_stiffness(
 
     for path in logs:
         check_inputs(path, dbc, names)
-    _check_outputs(out, report, [*logs, *(p for p in (dbc, names) if p is not None)], overwrite)
+    check_outputs(out, report, [*logs, *(p for p in (dbc, names) if p is not None)], overwrite)
     old = load_vehicle(vehicle)
     with working(not json, 2) as stage:
         stage("reading " + ", ".join(path.name for path in logs))

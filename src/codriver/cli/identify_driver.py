@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from codriver.cli.driver import Overwrite
-from codriver.cli.identify import Report, _check_outputs, _finite
+from codriver.cli.identify import Report, _finite, check_outputs
 from codriver.cli.identify_alignment import app
 from codriver.cli.options import Bus, Dbc, Json, Names
 
@@ -74,7 +74,7 @@ def driver(
         raise UsageError(f"--by {by}", f"one of {', '.join(WAYS)}", "choose one")
     other = load_two_point(beside) if beside is not None else None
     inputs = [*drives, *(p for p in (dbc, names, beside) if p is not None)]
-    _check_outputs(out, report, inputs, overwrite)
+    check_outputs(out, report, inputs, overwrite)
     if out.exists():
         load_two_point(out)  # raises: only a driver file may be replaced
     with working(not json, len(drives) + 1) as stage:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from codriver.cli.identify import Out, Overwrite, Report, _check_outputs, app
+from codriver.cli.identify import Out, Overwrite, Report, app, check_outputs
 from codriver.cli.options import Bus, Dbc, Json, LogPath, Names
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def steering_wheel(
 
     check_inputs(log, dbc, names)
     check_rate(rate)
-    _check_outputs(out, report, [log, *(p for p in (dbc, names) if p is not None)], overwrite)
+    check_outputs(out, report, [log, *(p for p in (dbc, names) if p is not None)], overwrite)
     old = load_vehicle(vehicle) if vehicle is not None else None
     with working(not json, 2) as stage:
         stage(f"reading {log.name}")
@@ -136,7 +136,7 @@ def torque_scale(
         raise UsageError(
             f"a radius of {radius:g} m and a gravity of {gravity:g} m/s^2", "positive numbers", "correct them"
         )
-    _check_outputs(out, report, [weighings], overwrite)
+    check_outputs(out, report, [weighings], overwrite)
     old = load_vehicle(vehicle) if vehicle is not None else None
     command, mass, own = read_weighings(weighings)
     fit = identify_torque_scale(

@@ -93,6 +93,7 @@ def two_wheeler(vehicle: Vehicle) -> tuple[LPV, str, tuple[float, float]]:
     Raises:
         VehicleError: it is no two-wheeler, or lacks some of its parameters.
     """
+    from codriver.cli.terminal import some
     from codriver.errors import VehicleError
     from codriver.models.bicycle import LETTERS as BICYCLE
     from codriver.models.bicycle import BicycleParameters, bicycle_lpv, bicycle_matrices
@@ -111,7 +112,7 @@ def two_wheeler(vehicle: Vehicle) -> tuple[LPV, str, tuple[float, float]]:
         return bicycle_lpv(matrices), "Whipple's four bodies on wheels that roll without slip", (0.0, 10.0)
     nearest = min(lacking, key=lambda kind: len(lacking[kind]))
     raise VehicleError(
-        f"vehicle '{vehicle.name}' is no two-wheeler: as a {nearest} it lacks {', '.join(lacking[nearest])}",
+        f"vehicle '{vehicle.name}' is no two-wheeler: as a {nearest} it lacks {some(lacking[nearest])}",
         "all parameters of Sharp's motorcycle or Whipple's bicycle",
         "add them to the vehicle file; docs/vehicles.md lists them, sharp1971 and meijaard2007 are examples",
     )

@@ -121,10 +121,11 @@ def _variation(fit: DriverFit) -> Finding:
     if fit.by == "direct":
         return Finding(
             "warn",
-            f"{left}, and last: he varies, which biases prediction errors, or what is given is not his; try by road",
+            f"{left}, and they last: he varies, which biases prediction errors, or what is given is not his; try by road",
         )
     return Finding(
-        "ok", f"{left}, and last: he varies (what the road makes of his torque is fitted), or what is given is not his"
+        "ok",
+        f"{left}, and they last: he varies (what the road makes of his torque is fitted), or what is given is not his",
     )
 
 

@@ -120,8 +120,8 @@ def _pieces(fit: DriverFit) -> Table:
     )
 
 
-def _torque(fit: DriverFit, record: int) -> tuple[Chart, Chart]:
-    """Measured torque, the model's, and the rest, over a drive; and the first stretch of it in detail."""
+def _torque(fit: DriverFit, record: int) -> tuple[Chart, ...]:
+    """Measured torque, the model's, and the rest, over a drive; and the first stretch of a long one in detail."""
     r, made = fit.records[record], fit.torque(record)
     rows = np.arange(r.first, r.last)
     rows = rows[:: max(rows.size // MOST_POINTS, 1)]
@@ -145,6 +145,8 @@ def _torque(fit: DriverFit, record: int) -> tuple[Chart, Chart]:
         f"The model's torque comes from what the driver saw and the wheel's angle, without any measured torque; a constant of "
         f"{offset:+.3f} N m is added.",
     )  # fmt: skip
+    if (r.last - r.first) * r.dt < 1.5 * SHOWN:
+        return (whole,)
     return whole, Chart(f"{title}, its first {SHOWN:g} s", "time (s)", (Plot("torque (N m)", both(part), 240),))
 
 

@@ -39,11 +39,8 @@ NAMES = (
 )  # fmt: skip
 DT, BLOCK = 0.02, 25  # s, ticks of a block
 MOVING, LEAST = 2.0, 12  # m/s, blocks
-TURNING, SWAYING, PITCHING = (
-    0.03,
-    0.03,
-    0.015,
-)  # rad/s, rad in 0.5 s, rad/s; standard deviations below which nothing is judged
+# Standard deviations below which nothing is judged: rad/s, rad in 0.5 s, rad/s.
+TURNING, SWAYING, PITCHING = 0.03, 0.03, 0.015
 AGAINST, LOOSE, WITH = -0.4, 0.3, 0.5  # correlations
 TIMES = 12.0  # roll rate and turn may differ by so much, degrees and radians by 57
 SHORT, LONG = 0.25, 12.0  # m, speed times steer angle over yaw rate; 1 to 4 in the rides we have

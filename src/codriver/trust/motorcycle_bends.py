@@ -27,10 +27,8 @@ from codriver.signals.grid import Flags
 from codriver.signals.signal import Array
 
 DEGREE = np.pi / 180
-LEAST, SWAYING = (
-    12,
-    0.1,
-)  # blocks; rad, sd of phi_m: by less, as where a bicycle is only kept upright, turns are not balanced
+LEAST = 12  # blocks
+SWAYING = 0.1  # rad, sd of phi_m: by less, as where a bicycle is only kept upright, turns are not balanced
 CONDITION = 1e6  # beyond, the columns cannot be told apart
 STRAIGHT = 0.95  # v r / g at most
 HOLD = 2.0  # s over which a bias of the roll rate adds up: 2 deg of roll for 1 deg/s, with motorcycle-kalman and -ts

@@ -149,7 +149,7 @@ class RideSetting:
             ),
         ):
             if wrong:
-                raise UsageError(found, expected, "choose one of these")
+                raise UsageError(found, expected, "change it")
         if self.seconds is not None and not self.seconds > 0:
             raise UsageError(f"a ride of {self.seconds:g} s", "more than 0 s", "choose such")
 
